@@ -1,0 +1,2 @@
+//! lodestream.
+fn main() {}

@@ -1,0 +1,1 @@
+//! lodestream: end-to-end tests.
