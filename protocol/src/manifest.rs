@@ -1,0 +1,209 @@
+//! The manifest: what a dataset is, as JSON in the boot block.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    attribute::{Attribute, Domain},
+    error::{Result, corrupt},
+    lattice::{Lattice, LatticeBox},
+};
+
+/// How a child relates to its parent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Refinement {
+    /// Children add to the parent: draw both (subsampling).
+    Additive,
+    /// Children stand in for the parent: draw either (clusters, surfels, averages, rectangles).
+    Replace,
+}
+
+/// What a node's elements are. The attributes each kind needs are checked on reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Primitive {
+    /// A position.
+    Point,
+    /// A position, `normal` and `radius` (world units).
+    Disc,
+    /// A position and the half axes `axis_u`, `axis_v` (world units, perpendicular).
+    Ellipse,
+    /// A centre, half sides `axis_u`, `axis_v`, `texture_size` (columns, rows) and texels:
+    /// `texel_color` (red, green, blue, alpha), optionally `texel_height` (offset along
+    /// `axis_u × axis_v`, in lattice units).
+    Rectangle,
+}
+
+impl Primitive {
+    /// Names and component counts of the attributes that the primitive cannot do without.
+    #[must_use]
+    pub const fn required_attributes(self) -> &'static [(&'static str, u8)] {
+        match self {
+            Self::Point => &[],
+            Self::Disc => &[("normal", 3), ("radius", 1)],
+            Self::Ellipse => &[("axis_u", 3), ("axis_v", 3)],
+            Self::Rectangle => {
+                &[("axis_u", 3), ("axis_v", 3), ("texture_size", 2), ("texel_color", 4)]
+            }
+        }
+    }
+}
+
+/// How the levels of detail were made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Method {
+    /// `poisson`, …
+    pub name: String,
+    /// Grid cells per node side; the minimum distance at a level is the node's side over this.
+    pub grid: u32,
+    /// A node with at most this many points is not split.
+    pub leaf_capacity: u32,
+}
+
+/// A column group: columns that are fetched together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GroupInfo {
+    /// `base` for group 0, which holds the positions; others by content.
+    pub name: String,
+    /// Bytes of the group over all nodes.
+    pub bytes: u64,
+}
+
+/// One input the dataset was made from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SourceInfo {
+    /// File name without directories, or the specification of a simulated scan.
+    pub name: String,
+    /// Points taken from it.
+    pub points: u64,
+}
+
+/// What a dataset is. Unknown fields are ignored by readers of the same major version.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Program and version that wrote the file.
+    pub generator: String,
+    /// Elements (points, discs, …) over all nodes.
+    pub points: u64,
+    /// Nodes in the tree.
+    pub nodes: u64,
+    /// Levels in the tree: one more than the deepest node's level; 0 for an empty dataset.
+    pub levels: u8,
+    /// How a child relates to its parent.
+    pub refinement: Refinement,
+    /// What the elements are.
+    pub primitive: Primitive,
+    /// How the levels were made.
+    pub method: Method,
+    /// The integer lattice of all coordinates.
+    pub lattice: Lattice,
+    /// Tight bounds of all points; min above max where there are none.
+    pub bounds: LatticeBox,
+    /// Largest distance on any axis between a source coordinate and its lattice point, world units.
+    pub largest_rounding: f64,
+    /// Attributes, in column order.
+    pub attributes: Vec<Attribute>,
+    /// Column groups; group 0 always exists and starts with the position column.
+    pub groups: Vec<GroupInfo>,
+    /// Coordinate reference system as the source gives it (WKT), if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crs: Option<String>,
+    /// Inputs, in build order.
+    pub sources: Vec<SourceInfo>,
+}
+
+impl Manifest {
+    /// Parses and checks a manifest.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`](crate::Error::Corrupt) where the JSON or its numbers cannot be a manifest.
+    pub fn parse(json: &[u8]) -> Result<Self> {
+        let manifest: Self =
+            serde_json::from_slice(json).map_err(|e| corrupt("manifest", e.to_string()))?;
+        manifest.check()?;
+        Ok(manifest)
+    }
+
+    /// The manifest as compact JSON.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`](crate::Error::Corrupt) where a number is not finite.
+    pub fn to_json(&self) -> Result<Vec<u8>> {
+        self.check()?;
+        serde_json::to_vec(self).map_err(|e| corrupt("manifest", e.to_string()))
+    }
+
+    fn check(&self) -> Result<()> {
+        let bad = |why: String| -> Result<()> { Err(corrupt("manifest", why)) };
+        if !self.lattice.is_valid() {
+            return bad(format!("unusable lattice {:?}", self.lattice));
+        }
+        if self.groups.is_empty() || self.groups.len() > 64 {
+            return bad(format!("{} column groups (1 to 64 allowed)", self.groups.len()));
+        }
+        if self.attributes.len() > 4096 {
+            return bad(format!("{} attributes (at most 4096 allowed)", self.attributes.len()));
+        }
+        if !self.largest_rounding.is_finite() {
+            return bad("largest_rounding is not finite".into());
+        }
+        for (i, attribute) in self.attributes.iter().enumerate() {
+            let name = &attribute.name;
+            if name.is_empty() || name == "position" {
+                return bad(format!("attribute name {name:?} is not allowed"));
+            }
+            if self.attributes[..i].iter().any(|other| other.name == *name) {
+                return bad(format!("attribute {name} appears twice"));
+            }
+            if !(1..=64).contains(&attribute.components) {
+                return bad(format!("attribute {name} has {} components", attribute.components));
+            }
+            match attribute.group() {
+                Some(group) if group >= self.groups.len() => {
+                    return bad(format!("attribute {name} is in group {group}, which is not there"));
+                }
+                None if attribute.constant().is_none() => {
+                    return bad(format!("attribute {name} has a malformed constant"));
+                }
+                _ => {}
+            }
+            if attribute.domain == Domain::Texel && self.primitive != Primitive::Rectangle {
+                return bad(format!("attribute {name} has texels but there are no textures"));
+            }
+        }
+        for &(name, components) in self.primitive.required_attributes() {
+            if self.attribute(name).is_none_or(|a| a.components != components) {
+                return bad(format!(
+                    "{:?} primitives need attribute {name} with {components} components",
+                    self.primitive
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The attribute of that name.
+    #[must_use]
+    pub fn attribute(&self, name: &str) -> Option<&Attribute> {
+        self.attributes.iter().find(|a| a.name == name)
+    }
+
+    /// Attributes stored as columns of `group`, in column order.
+    pub fn columns_of(&self, group: usize) -> impl Iterator<Item = &Attribute> {
+        self.attributes.iter().filter(move |a| a.group() == Some(group))
+    }
+
+    /// Distance in world units that points of a sampled node of `level` keep from one another.
+    #[must_use]
+    pub fn spacing_world(&self, level: u8) -> f64 {
+        self.lattice.node_side_world(level) / f64::from(self.method.grid.max(1))
+    }
+
+    /// Tight bounds in world units (lowest, highest corner); `None` where there are no points.
+    #[must_use]
+    pub fn bounds_world(&self) -> Option<([f64; 3], [f64; 3])> {
+        (self.points > 0)
+            .then(|| (self.lattice.world(self.bounds.min), self.lattice.world(self.bounds.max)))
+    }
+}
+
