@@ -21,14 +21,17 @@ mod morton;
 mod wire;
 
 pub use attribute::{Attribute, Domain, ScalarType, Storage};
-pub use boot::{BOOT_SPECULATIVE_BYTES, Boot, HEADER_BYTES, Header, MAGIC, VERSION_MAJOR, VERSION_MINOR};
+pub use boot::{
+    BOOT_SPECULATIVE_BYTES, Boot, HEADER_BYTES, Header, MAGIC, VERSION_MAJOR, VERSION_MINOR,
+};
 pub use column::{
-    Column, Encoding, PrimitiveCounts, decode_group, encode_group, encode_positions,
+    Column, DecodedGroup, Encoding, decode_group, decode_unchecked, encode_column, encode_positions,
 };
 pub use dataset::{Dataset, NodePoints, ReadAt};
 pub use error::{Error, Result};
-pub use hierarchy::{HierarchyPage, Node, PageRef, PayloadRef, quantize_bounds};
+pub use hierarchy::{HierarchyPage, MAX_NODE_POINTS, Node, PageRef, PayloadRef};
 pub use key::NodeKey;
 pub use lattice::{Lattice, LatticeBox, MAX_SIDE_BITS};
 pub use manifest::{GroupInfo, Manifest, Method, Primitive, Refinement, SourceInfo};
 pub use morton::{MortonCode, morton_decode, morton_encode};
+pub use wire::MAX_PAGE_BYTES;

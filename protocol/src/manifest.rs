@@ -160,7 +160,9 @@ impl Manifest {
             }
             match attribute.group() {
                 Some(group) if group >= self.groups.len() => {
-                    return bad(format!("attribute {name} is in group {group}, which is not there"));
+                    return bad(format!(
+                        "attribute {name} is in group {group}, which is not there"
+                    ));
                 }
                 None if attribute.constant().is_none() => {
                     return bad(format!("attribute {name} has a malformed constant"));
@@ -206,4 +208,3 @@ impl Manifest {
             .then(|| (self.lattice.world(self.bounds.min), self.lattice.world(self.bounds.max)))
     }
 }
-
