@@ -1,6 +1,29 @@
 //! The camera: where it stands, what it sees. All in f64 world units.
+//!
+//! View space is right-handed: x to the right, y up, and the camera looks along -z. Clip space is
+//! that of wgpu (y up, depth 0 to 1) with reversed depth: 1 at the near plane, 0 infinitely far
+//! away, so that the precision of floating-point depth is spent evenly over all distances.
+//!
+//! A camera is read from and written to a small JSON file:
+//!
+//! ```json
+//! { "eye": [0, -10, 5], "target": [0, 0, 0], "up": [0, 0, 1], "fov_y_degrees": 60 }
+//! ```
+//!
+//! with `orthographic_height` (world units from the lower to the upper edge) in place of
+//! `fov_y_degrees` for an orthographic view. `up` may be left out: +z.
 
-use glam::DVec3;
+use glam::{DMat3, DMat4, DVec3, DVec4};
+use serde::{Deserialize, Serialize};
+
+/// Full vertical field of view of an [overview](Camera::overview), in degrees.
+const OVERVIEW_FOV_Y_DEGREES: f64 = 50.0;
+
+/// From the middle of the cloud towards the overview's eye: from the south-south-east, well above.
+const OVERVIEW_FROM: DVec3 = DVec3::new(0.35, -1.0, 0.75);
+
+/// How much farther away than necessary an overview stands: 4 % of margin around the cloud.
+const OVERVIEW_MARGIN: f64 = 1.04;
 
 /// How the view is projected.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,4 +51,313 @@ pub struct Camera {
     pub up: DVec3,
     /// How the view is projected.
     pub projection: Projection,
+}
+
+/// Why numbers are no camera.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CameraError {
+    /// The text is not a camera file.
+    #[error("not a camera file: {0}")]
+    Json(String),
+    /// The numbers cannot be those of a camera.
+    #[error("impossible camera: {0}")]
+    Impossible(&'static str),
+}
+
+/// The camera's axes in world space: orthonormal, right-handed (`right × up = -forward`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewBasis {
+    /// To the right edge of the picture.
+    pub right: DVec3,
+    /// To the upper edge of the picture.
+    pub up: DVec3,
+    /// Into the picture.
+    pub forward: DVec3,
+}
+
+impl ViewBasis {
+    /// Rotation from world to view space.
+    #[must_use]
+    pub fn view_from_world(&self) -> DMat3 {
+        DMat3::from_cols(self.right, self.up, -self.forward).transpose()
+    }
+}
+
+/// The camera file as it is written.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraFile {
+    eye: [f64; 3],
+    target: [f64; 3],
+    #[serde(default = "z_axis")]
+    up: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    fov_y_degrees: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    orthographic_height: Option<f64>,
+}
+
+fn z_axis() -> [f64; 3] {
+    DVec3::Z.to_array()
+}
+
+impl Camera {
+    /// Reads a camera file.
+    ///
+    /// # Errors
+    /// [`CameraError::Json`] where the text is not such a file, [`CameraError::Impossible`] as
+    /// for [`check`](Self::check).
+    pub fn from_json(text: &str) -> Result<Self, CameraError> {
+        let file: CameraFile =
+            serde_json::from_str(text).map_err(|e| CameraError::Json(e.to_string()))?;
+        let projection = match (file.fov_y_degrees, file.orthographic_height) {
+            (Some(degrees), None) => Projection::Perspective { fov_y: degrees.to_radians() },
+            (None, Some(height)) => Projection::Orthographic { height },
+            _ => {
+                let why = "give either fov_y_degrees or orthographic_height";
+                return Err(CameraError::Json(why.into()));
+            }
+        };
+        let camera = Self {
+            eye: file.eye.into(),
+            target: file.target.into(),
+            up: file.up.into(),
+            projection,
+        };
+        camera.check()?;
+        Ok(camera)
+    }
+
+    /// The camera file, as [`from_json`](Self::from_json) reads it.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        let (fov_y_degrees, orthographic_height) = match self.projection {
+            Projection::Perspective { fov_y } => (Some(fov_y.to_degrees()), None),
+            Projection::Orthographic { height } => (None, Some(height)),
+        };
+        let file = CameraFile {
+            eye: self.eye.to_array(),
+            target: self.target.to_array(),
+            up: self.up.to_array(),
+            fov_y_degrees,
+            orthographic_height,
+        };
+        serde_json::to_string_pretty(&file).expect("numbers and options always serialize")
+    }
+
+    /// Whether the numbers are those of a camera.
+    ///
+    /// # Errors
+    /// [`CameraError::Impossible`] where a number is not finite, the eye is at the target, `up` is
+    /// zero, or the projection is out of its range.
+    pub fn check(&self) -> Result<(), CameraError> {
+        let bad = |why| Err(CameraError::Impossible(why));
+        if !(self.eye.is_finite() && self.target.is_finite() && self.up.is_finite()) {
+            return bad("eye, target and up must be finite numbers");
+        }
+        if (self.target - self.eye).try_normalize().is_none() {
+            return bad("eye and target are the same place");
+        }
+        if self.up.try_normalize().is_none() {
+            return bad("up is zero");
+        }
+        match self.projection {
+            // A picture that spans 180 degrees is infinitely high.
+            Projection::Perspective { fov_y } if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) => {
+                bad("fov_y_degrees must be above 0 and below 180")
+            }
+            Projection::Orthographic { height } if !(height > 0.0 && height.is_finite()) => {
+                bad("orthographic_height must be above 0")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The camera's axes. Where `up` is parallel to the view direction, y stands in for it (or x,
+    /// where the view is along y).
+    #[must_use]
+    pub fn basis(&self) -> ViewBasis {
+        let forward = (self.target - self.eye).try_normalize().unwrap_or(DVec3::NEG_Z);
+        // The sine of the smallest angle between two directions that still tells a third one.
+        let apart =
+            |up: DVec3| Some(forward.cross(up.try_normalize()?)).filter(|c| c.length() > 1e-9);
+        let right = [self.up, DVec3::Y, DVec3::X].into_iter().find_map(apart);
+        let right = right.map_or(DVec3::X, DVec3::normalize);
+        ViewBasis { right, up: right.cross(forward), forward }
+    }
+
+    /// Clip space from world space for a picture of `aspect` = width / height: reversed depth,
+    /// `near` world units for 1 and infinity for 0 in perspective; in an orthographic view, depth
+    /// falls from 1 at the eye's plane to 0 at `far`.
+    ///
+    /// For culling. The renderers do not use it: at large coordinates they need the difference to
+    /// the eye taken first.
+    #[must_use]
+    pub fn clip_from_world(&self, aspect: f64, near: f64, far: f64) -> DMat4 {
+        let clip_from_view = match self.projection {
+            Projection::Perspective { fov_y } => {
+                let scale = 1.0 / (0.5 * fov_y).tan();
+                DMat4::from_cols(
+                    DVec4::new(scale / aspect, 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, scale, 0.0, 0.0),
+                    DVec4::new(0.0, 0.0, 0.0, -1.0),
+                    DVec4::new(0.0, 0.0, near, 0.0),
+                )
+            }
+            Projection::Orthographic { height } => DMat4::from_cols(
+                DVec4::new(2.0 / (height * aspect), 0.0, 0.0, 0.0),
+                DVec4::new(0.0, 2.0 / height, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, 1.0 / far, 0.0),
+                DVec4::new(0.0, 0.0, 1.0, 1.0),
+            ),
+        };
+        let rotation = self.basis().view_from_world();
+        clip_from_view * DMat4::from_mat3(rotation) * DMat4::from_translation(-self.eye)
+    }
+
+    /// Pixels that one world unit across the view takes up at `distance` world units along the view
+    /// direction, in a picture `height_px` pixels high.
+    #[must_use]
+    pub fn pixels_per_world(&self, distance: f64, height_px: u32) -> f64 {
+        let height_px = f64::from(height_px);
+        match self.projection {
+            Projection::Perspective { fov_y } => 0.5 * height_px / (0.5 * fov_y).tan() / distance,
+            Projection::Orthographic { height } => height_px / height,
+        }
+    }
+
+    /// A perspective camera that sees all of the box in a picture of `aspect` = width / height:
+    /// from above, the box filling the picture as far as its shape allows.
+    #[must_use]
+    pub fn overview(min: DVec3, max: DVec3, aspect: f64) -> Self {
+        let fov_y = OVERVIEW_FOV_Y_DEGREES.to_radians();
+        let middle = 0.5 * (min + max);
+        let camera = Self {
+            eye: middle + OVERVIEW_FROM,
+            target: middle,
+            up: DVec3::Z,
+            projection: Projection::Perspective { fov_y },
+        };
+        // Of the direction itself, not of eye - target, which at large coordinates is coarse.
+        let basis = Self { eye: OVERVIEW_FROM, target: DVec3::ZERO, ..camera }.basis();
+        let tangent_y = (0.5 * fov_y).tan();
+        let tangent_x = tangent_y * aspect;
+        // A corner at (x, y) across and z behind the middle is inside the picture where
+        // |x| <= (distance + z) * tangent_x and |y| <= (distance + z) * tangent_y.
+        let needed = (0..8).map(|corner| {
+            let pick = |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
+            let corner = DVec3::new(pick(0), pick(1), pick(2)) - middle;
+            let (x, y) = (corner.dot(basis.right).abs(), corner.dot(basis.up).abs());
+            (x / tangent_x).max(y / tangent_y) - corner.dot(basis.forward)
+        });
+        let distance = OVERVIEW_MARGIN * needed.fold(0.0, f64::max);
+        // A cloud without extent is looked at from as near as its coordinates can tell apart.
+        let distance = distance.max(1e-6 * middle.abs().max_element()).max(1e-6);
+        Self { eye: middle - distance * basis.forward, ..camera }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        Camera {
+            eye: DVec3::new(3.0, -4.0, 5.0),
+            target: DVec3::ZERO,
+            up: DVec3::Z,
+            projection: Projection::Perspective { fov_y: 1.0 },
+        }
+    }
+
+    #[test]
+    fn basis_is_orthonormal_and_right_handed() {
+        let straight_down = Camera { eye: DVec3::Z, ..camera() };
+        let along_y = Camera { eye: DVec3::NEG_Y, up: DVec3::Y, ..camera() };
+        for camera in [camera(), straight_down, along_y] {
+            let ViewBasis { right, up, forward } = camera.basis();
+            for axis in [right, up, forward] {
+                assert!((axis.length() - 1.0).abs() < 1e-15, "{axis}");
+            }
+            assert!((right.cross(up) + forward).length() < 1e-15);
+        }
+        assert_eq!(straight_down.basis().up, DVec3::Y, "north is up in a view straight down");
+    }
+
+    #[test]
+    fn json_round_trip_keeps_the_camera() {
+        let orthographic = Projection::Orthographic { height: 12.5 };
+        for camera in [camera(), Camera { projection: orthographic, ..camera() }] {
+            let again = Camera::from_json(&camera.to_json()).expect("own file");
+            assert_eq!(again.eye, camera.eye);
+            match (again.projection, camera.projection) {
+                (Projection::Perspective { fov_y: a }, Projection::Perspective { fov_y: b }) => {
+                    assert!((a - b).abs() < 1e-15);
+                }
+                (a, b) => assert_eq!(a, b),
+            }
+        }
+    }
+
+    #[test]
+    fn up_may_be_left_out_of_the_file() {
+        let text = r#"{ "eye": [1, 2, 3], "target": [0, 0, 0], "fov_y_degrees": 60 }"#;
+        assert_eq!(Camera::from_json(text).expect("valid").up, DVec3::Z);
+    }
+
+    #[test]
+    fn impossible_cameras_are_refused() {
+        let refused = |text: &str| Camera::from_json(text).expect_err(text).to_string();
+        let with = |rest: &str| refused(&format!(r#"{{"eye":[1,0,0],"target":[0,0,0],{rest}}}"#));
+        assert!(with(r#""fov_y_degrees":180"#).contains("below 180"));
+        assert!(with(r#""fov_y_degrees":0"#).contains("above 0"));
+        assert!(with(r#""orthographic_height":-1"#).contains("orthographic_height"));
+        assert!(with(r#""fov_y_degrees":60,"orthographic_height":1"#).contains("either"));
+        assert!(with(r#""up":[0,0,1]"#).contains("either"));
+        assert!(with(r#""up":[0,0,0],"fov_y_degrees":60"#).contains("up is zero"));
+        assert!(with(r#""fov":60"#).contains("unknown field"));
+        let same = r#"{"eye":[1,0,0],"target":[1,0,0],"fov_y_degrees":60}"#;
+        assert!(refused(same).contains("same place"));
+    }
+
+    #[test]
+    fn overview_holds_the_whole_box_and_fills_one_direction() {
+        let boxes = [
+            (DVec3::new(635_577.0, 848_882.0, 406.0), DVec3::new(639_003.0, 853_537.0, 615.0)),
+            (DVec3::splat(-1.0), DVec3::splat(1.0)),
+            (DVec3::ZERO, DVec3::new(1e-3, 1e4, 0.0)),
+        ];
+        for ((min, max), aspect) in boxes.into_iter().flat_map(|b| [(b, 0.5), (b, 16.0 / 9.0)]) {
+            let clip = Camera::overview(min, max, aspect).clip_from_world(aspect, 1e-3, 1e9);
+            let mut widest = 0.0_f64;
+            for corner in 0..8 {
+                let pick =
+                    |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
+                let p = clip * DVec3::new(pick(0), pick(1), pick(2)).extend(1.0);
+                assert!(p.w > 0.0);
+                widest = widest.max((p.x / p.w).abs()).max((p.y / p.w).abs());
+            }
+            assert!((0.85..1.0).contains(&widest), "{widest} of the half picture for {min} {max}");
+        }
+    }
+
+    #[test]
+    fn overview_of_one_point_is_a_camera() {
+        for p in [DVec3::ZERO, DVec3::new(5e5, 5e6, 100.0), DVec3::splat(-1e9)] {
+            Camera::overview(p, p, 1.5).check().expect("eye and target differ");
+        }
+    }
+
+    #[test]
+    fn depth_is_reversed_from_near_to_infinity() {
+        let camera = camera();
+        let depth = |distance: f64| {
+            let p = camera.eye + distance * camera.basis().forward;
+            let clip = camera.clip_from_world(1.0, 0.5, 1e9) * p.extend(1.0);
+            clip.z / clip.w
+        };
+        assert!((depth(0.5) - 1.0).abs() < 1e-12);
+        assert!(depth(10.0) > depth(11.0));
+        assert!(depth(1e12) < 1e-12);
+    }
 }

@@ -1,1 +1,4 @@
 //! lodestream: client.
+
+pub mod camera;
+pub mod source;

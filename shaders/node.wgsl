@@ -1,0 +1,80 @@
+// Nodes: from packed records to view space. The one place that knows the record layout.
+// Rust twins: `NodeUniform` and `ChunkEntry` in client/src/render/gpu/layout.rs; packing:
+// client/src/render/gpu/pack.rs.
+//
+// A record is x, y, z relative to the lowest corner of the node's points, each with as few bits as
+// the node needs, then the colour payload; records follow one another without padding, lowest bit
+// first. A chunk is CHUNK_POINTS records and starts at a word.
+
+struct Node {
+    // View space position of the anchor, world units.
+    anchor_view: vec3<f32>,
+    // Bits of x, y, z and payload, one byte each, lowest first.
+    record_bits: u32,
+    // View space displacement per lattice step along x, y and z.
+    step_x: vec3<f32>,
+    // Colour of the whole node: red, green, blue, alpha from the lowest byte.
+    color: u32,
+    step_y: vec3<f32>,
+    // Place on the elevation ramp (0 to 1) of relative z = 0, and the rise per lattice step.
+    elevation: f32,
+    step_z: vec3<f32>,
+    elevation_step: f32,
+    // The lattice point nearest to the eye within the box of the node's points. Differences to
+    // it are taken in integers: near the eye nothing is lost, far from it nothing cancels.
+    anchor: vec3<u32>,
+    padding: u32,
+}
+
+struct Chunk {
+    node: u32,
+    first_word: u32,
+    points: u32,
+}
+
+@group(0) @binding(1) var<storage, read> nodes: array<Node>;
+@group(0) @binding(2) var<storage, read> chunks: array<Chunk>;
+@group(1) @binding(0) var<storage, read> words: array<u32>;
+
+// `count` (0 to 32) bits that start `bit` bits after `first_word`.
+fn read_bits(first_word: u32, bit: u32, count: u32) -> u32 {
+    if count == 0u {
+        return 0u;
+    }
+    let word = first_word + (bit >> 5u);
+    let shift = bit & 31u;
+    var value = words[word] >> shift;
+    if shift + count > 32u {
+        value |= words[word + 1u] << (32u - shift);
+    }
+    return value & (0xffffffffu >> (32u - count));
+}
+
+struct Record {
+    // Lattice units relative to the lowest corner of the node's points.
+    position: vec3<u32>,
+    payload: u32,
+}
+
+fn read_record(chunk: Chunk, record_bits: u32, index: u32) -> Record {
+    let bits = vec4(record_bits, record_bits >> 8u, record_bits >> 16u, record_bits >> 24u) & vec4(255u);
+    let x_at = index * (bits.x + bits.y + bits.z + bits.w);
+    let y_at = x_at + bits.x;
+    let z_at = y_at + bits.y;
+    var record: Record;
+    record.position = vec3(
+        read_bits(chunk.first_word, x_at, bits.x),
+        read_bits(chunk.first_word, y_at, bits.y),
+        read_bits(chunk.first_word, z_at, bits.z),
+    );
+    record.payload = read_bits(chunk.first_word, z_at + bits.z, bits.w);
+    return record;
+}
+
+fn view_from_record(node: Node, position: vec3<u32>) -> vec3<f32> {
+    // Unsigned differences may span 32 bits, so the sign is taken apart.
+    let above = vec3<f32>(position - node.anchor);
+    let below = vec3<f32>(node.anchor - position);
+    let d = select(-below, above, position >= node.anchor);
+    return node.anchor_view + d.x * node.step_x + d.y * node.step_y + d.z * node.step_z;
+}
