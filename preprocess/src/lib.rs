@@ -1,6 +1,32 @@
 //! Scans in, one dataset file out.
+//!
+//! [`build()`] reads every input once, puts its points on one integer lattice, and writes a nested
+//! octree with levels of detail; [`verify()`] proves that a dataset is what it should be.
 
+mod assemble;
+mod blobs;
+mod build;
+mod chunk;
+mod distribute;
+mod encode;
 mod error;
+mod file;
+mod grid;
+mod inputs;
+mod lod;
+mod memory;
+mod numbers;
+mod plan;
+mod positioned;
 pub mod readers;
+mod schedule;
+mod schema;
+mod sort;
+mod store;
+mod tree;
 
+pub use build::{
+    BuildConfig, BuildReport, ColumnBytes, Dropped, Method, PhaseSeconds, Progress, build,
+};
 pub use error::{Error, Result};
+pub use file::FileSource;

@@ -1,0 +1,633 @@
+//! The build: files in, one dataset file out.
+//!
+//! Read once → choose the lattice → count and plan chunks → distribute → build every chunk in core →
+//! join the top of the tree → write. See `ARCHITECTURE.md` for why each step is as it is.
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Instant,
+};
+
+use lodestream_protocol::{
+    LatticeBox, Manifest, Method as ManifestMethod, MortonCode, NodeKey, Primitive, Refinement,
+    SourceInfo,
+};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::{
+    assemble,
+    blobs::Blobs,
+    chunk::{self, Context},
+    distribute,
+    encode::{Layout, NodeEncoder, OutNode, Ranges},
+    error::{Error, Result},
+    grid::{self, InputCoordinates},
+    inputs::{self, OpenedInput},
+    lod::poisson::{self, Domain, Skin},
+    memory,
+    plan::Plan,
+    readers::CoordinateKind,
+    schedule,
+    schema::{RowMap, Schema},
+    store::{RawBlock, Store, StoreWriter},
+    tree::Tree,
+};
+
+/// How levels of detail are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Poisson-disk subsampling into a nested octree (Radner 2018, 3.1.1 and 5.1).
+    #[default]
+    Poisson,
+}
+
+impl Method {
+    /// The name on the command line and in the manifest.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Poisson => "poisson",
+        }
+    }
+}
+
+/// What to build.
+#[derive(Debug, Clone)]
+pub struct BuildConfig {
+    /// Files, folders, or simulated scans (`sim:courtyard?points=2M&seed=1`).
+    pub inputs: Vec<String>,
+    /// The dataset file.
+    pub output: PathBuf,
+    /// How levels of detail are made.
+    pub method: Method,
+    /// Grid cells per node side: a power of two, 4 to 1024.
+    pub grid: u32,
+    /// Memory the build may take, in bytes.
+    pub memory_bytes: u64,
+    /// Threads; `None`: as many as the machine has.
+    pub threads: Option<usize>,
+    /// Names of attributes to leave out.
+    pub drop_attributes: Vec<String>,
+    /// What the columns of text inputs are; `None`: detected.
+    pub columns: Option<String>,
+    /// Lattice step in world units; `None`: the inputs' own, or far below the point spacing.
+    pub scale: Option<f64>,
+    /// Set to stop the build.
+    pub cancel: Arc<AtomicBool>,
+}
+
+/// Hears how the build gets on. Called from many threads.
+pub trait Progress: Sync {
+    /// A phase begins: `total` of `unit` are to be done (0: unknown).
+    fn phase(&self, name: &str, total: u64, unit: &str);
+    /// So much more of the phase is done.
+    fn advance(&self, amount: u64);
+    /// Something that the user should know.
+    fn warn(&self, line: &str);
+}
+
+/// What was built. Also the `--report` of `lodestream build`.
+#[derive(Debug, Clone, Serialize)]
+pub struct BuildReport {
+    /// The dataset file.
+    pub output: PathBuf,
+    /// Points in the inputs.
+    pub points_read: u64,
+    /// Points in the dataset.
+    pub points_written: u64,
+    /// Points left out, by reason.
+    pub dropped: Vec<Dropped>,
+    /// Largest distance on any axis between a source coordinate and its lattice point, world units.
+    pub largest_coordinate_error: f64,
+    /// World units per lattice unit.
+    pub scale: f64,
+    /// Nodes in the tree.
+    pub nodes: u64,
+    /// Levels in the tree.
+    pub levels: u8,
+    /// Chunks built in core.
+    pub chunks: u64,
+    /// Whether the points went through temporary files.
+    pub spilled: bool,
+    /// Seconds per phase, in order.
+    pub seconds: Vec<PhaseSeconds>,
+    /// Seconds in all.
+    pub total_seconds: f64,
+    /// Most memory the process has held, in bytes, where the system tells.
+    pub peak_memory_bytes: Option<u64>,
+    /// Length of the dataset file.
+    pub file_bytes: u64,
+    /// Header, manifest and hierarchy.
+    pub index_bytes: u64,
+    /// Encoded bytes per column; constants take none.
+    pub columns: Vec<ColumnBytes>,
+    /// What a user should know of, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Points left out of the dataset for one reason.
+#[derive(Debug, Clone, Serialize)]
+pub struct Dropped {
+    /// Input and reason.
+    pub reason: String,
+    /// How many.
+    pub points: u64,
+}
+
+/// Time spent in a phase.
+#[derive(Debug, Clone, Serialize)]
+pub struct PhaseSeconds {
+    /// Phase.
+    pub phase: String,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+/// Size of a column.
+#[derive(Debug, Clone, Serialize)]
+pub struct ColumnBytes {
+    /// Attribute, or `position`.
+    pub name: String,
+    /// Encoded bytes over all nodes.
+    pub bytes: u64,
+    /// Encoded bytes per point of the dataset.
+    pub bytes_per_point: f64,
+}
+
+/// Most points of a chunk built in core.
+const CHUNK_POINTS_MAX: u64 = 1 << 20;
+/// Fewest: below, borders cost more than parallelism gains.
+const CHUNK_POINTS_MIN: u64 = 1 << 17;
+/// Chunks to aim for, so that all threads have work to the end.
+const CHUNKS_WANTED: u64 = 16;
+/// Bytes of working memory per point of a chunk in core, besides its rows.
+const CHUNK_BYTES_PER_POINT: u64 = 80;
+
+struct Phases<'a> {
+    progress: &'a dyn Progress,
+    started: Instant,
+    done: Vec<PhaseSeconds>,
+    name: String,
+}
+
+impl<'a> Phases<'a> {
+    fn begin(&mut self, name: &str, total: u64, unit: &str) {
+        self.end();
+        self.name = name.into();
+        self.started = Instant::now();
+        self.progress.phase(name, total, unit);
+    }
+
+    fn end(&mut self) {
+        if !self.name.is_empty() {
+            let seconds = self.started.elapsed().as_secs_f64();
+            self.done.push(PhaseSeconds { phase: std::mem::take(&mut self.name), seconds });
+        }
+    }
+}
+
+/// Builds a dataset.
+///
+/// The same inputs and parameters give the same bytes, for any number of threads and any memory.
+///
+/// # Errors
+/// What is wrong with an input, the options, the disk; [`Error::Interrupted`] when cancelled.
+/// Nothing is left at the output's place then that was not there before.
+pub fn build(config: &BuildConfig, progress: &dyn Progress) -> Result<BuildReport> {
+    if !(4..=1024).contains(&config.grid) || !config.grid.is_power_of_two() {
+        return Err(Error::Setup(format!(
+            "--grid {}: must be a power of two from 4 to 1024",
+            config.grid
+        )));
+    }
+    if config.scale.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
+        return Err(Error::Setup("--scale must be a finite number above zero".into()));
+    }
+    let threads = config
+        .threads
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+        .max(1);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Error::Setup(format!("cannot start {threads} threads: {e}")))?;
+    pool.install(|| build_in_pool(config, threads, progress))
+}
+
+fn build_in_pool(
+    config: &BuildConfig,
+    threads: usize,
+    progress: &dyn Progress,
+) -> Result<BuildReport> {
+    let begun = Instant::now();
+    let check = || match config.cancel.load(Ordering::Relaxed) {
+        true => Err(Error::Interrupted),
+        false => Ok(()),
+    };
+    let folder = match config.output.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    check_output(&config.output, folder)?;
+    let mut warnings: Vec<String> = Vec::new();
+    let mut phases =
+        Phases { progress, started: begun, done: Vec::new(), name: String::new() };
+
+    let opened = inputs::open_all(&config.inputs, config.columns.as_deref())?;
+    for input in &opened {
+        for line in &input.info.left_out {
+            warnings.push(format!("{}: {line}", input.info.path));
+        }
+    }
+    let announced: Option<u64> = opened.iter().map(|i| i.info.points).sum();
+    phases.begin("read", announced.unwrap_or(0), "points");
+    let read = read_all(config, opened, folder, &check, progress, &mut warnings)?;
+    let points: u64 = read.writer.points.iter().sum();
+    let points_per_input = read.writer.points.clone();
+
+    phases.begin("plan", points, "points");
+    let coordinates: Vec<InputCoordinates> = read
+        .kinds
+        .iter()
+        .zip(&read.writer.bounds)
+        .map(|(&kind, &bounds)| InputCoordinates { kind, bounds })
+        .collect();
+    let choice = grid::choose(&coordinates, points, config.scale)?;
+    warnings.extend(choice.note.clone());
+    let raw = read.writer.finish()?;
+    let mut store = raw.place(choice.placements, choice.lattice, &read.schema);
+    let spilled = matches!(store, Store::File(_));
+    let leaf_capacity = config.grid * config.grid;
+    let capacity = (points / CHUNKS_WANTED)
+        .clamp(CHUNK_POINTS_MIN, CHUNK_POINTS_MAX)
+        .max(u64::from(leaf_capacity));
+    let mut plan = Plan::new(choice.lattice.side_bits);
+    let row_bytes = read.schema.row_bytes;
+    let scan = distribute::count(&mut store, &mut plan, capacity, row_bytes, &check)?;
+    check_chunks(&plan, config.memory_bytes)?;
+    let constant = constant_attributes(&read.schema, &scan.constant_bytes);
+    let layout = Layout::new(&read.schema, &constant, &scan.first_row);
+    let mut manifest = Manifest {
+        generator: concat!("lodestream ", env!("CARGO_PKG_VERSION")).into(),
+        points,
+        nodes: 0,
+        levels: 0,
+        refinement: Refinement::Additive,
+        primitive: Primitive::Point,
+        method: ManifestMethod {
+            name: config.method.name().into(),
+            grid: config.grid,
+            leaf_capacity,
+        },
+        lattice: choice.lattice,
+        bounds: scan.bounds.unwrap_or(LatticeBox::EMPTY),
+        largest_rounding: scan.rounding,
+        attributes: layout.attributes.clone(),
+        groups: layout.groups.clone(),
+        crs: read.crs,
+        sources: read
+            .names
+            .iter()
+            .zip(points_per_input)
+            .map(|(name, points)| SourceInfo { name: name.clone(), points })
+            .collect(),
+    };
+    let write_buffers = config.memory_bytes / 8;
+    let points_by_chunk =
+        distribute::distribute(store, &plan, row_bytes, folder, write_buffers, &check)?;
+
+    phases.begin("build", points, "points");
+    let context =
+        Context { manifest: &manifest, layout: &layout, grid_bits: config.grid.ilog2() as u8 };
+    let neighbours = plan.neighbours();
+    let dependencies = schedule::dependencies(&neighbours);
+    let chunks = plan.chunks.len();
+    let blobs = Blobs::new(chunks + 1, config.memory_bytes / 4, folder.to_path_buf());
+    let skins: Vec<Mutex<Option<Arc<Skin>>>> = (0..chunks).map(|_| Mutex::new(None)).collect();
+    let results: Vec<Mutex<Option<(Vec<OutNode>, Ranges, chunk::Root)>>> =
+        (0..chunks).map(|_| Mutex::new(None)).collect();
+    let cost =
+        |i: usize| plan.chunks[i].points * (CHUNK_BYTES_PER_POINT + 2 * row_bytes as u64);
+    schedule::run(&dependencies, threads, cost, config.memory_bytes / 2, |i| {
+        check()?;
+        let near: Vec<Arc<Skin>> = dependencies[i]
+            .iter()
+            .filter_map(|&j| skins[j].lock().expect("no holder panics").clone())
+            .collect();
+        let near: Vec<&Skin> = near.iter().map(AsRef::as_ref).collect();
+        let points = points_by_chunk.points(&plan, i, folder)?;
+        let built = chunk::build(&context, plan.chunks[i].key, i as u32, &points, &near)?;
+        *skins[i].lock().expect("no holder panics") = Some(Arc::new(built.skin));
+        blobs.put(i, built.buffers)?;
+        let result = Some((built.nodes, built.ranges, built.root));
+        *results[i].lock().expect("no holder panics") = result;
+        progress.advance(plan.chunks[i].points);
+        Ok(())
+    })?;
+    drop(points_by_chunk);
+    drop(skins);
+
+    phases.begin("join", 0, "");
+    let mut nodes = Vec::new();
+    let mut ranges = Ranges::new(&layout);
+    let mut roots = Vec::with_capacity(chunks);
+    for result in results {
+        let result = result.into_inner().expect("no holder panics");
+        let (chunk_nodes, chunk_ranges, root) = result.expect("every chunk was built");
+        nodes.extend(chunk_nodes);
+        ranges.merge(&chunk_ranges);
+        roots.push(root);
+    }
+    if !roots.is_empty() {
+        let top = if choice.lattice.side_bits <= <u64 as MortonCode>::AXIS_BITS {
+            join::<u64>(&context, roots, chunks as u32)?
+        } else {
+            join::<u128>(&context, roots, chunks as u32)?
+        };
+        nodes.extend(top.nodes);
+        ranges.merge(&top.ranges);
+        blobs.put(chunks, top.buffers)?;
+    }
+    check()?;
+    assemble::prune(&mut nodes);
+    assemble::sort(&mut nodes);
+    manifest.nodes = nodes.len() as u64;
+    manifest.levels = nodes.last().map_or(0, |n| n.key.level() + 1);
+    for (attribute, components) in manifest.attributes.iter_mut().zip(&ranges.components) {
+        fill_range(attribute, components);
+    }
+
+    let blobs = blobs.finish();
+    let payload_bytes: u64 = ranges.column_bytes.iter().sum();
+    phases.begin("write", payload_bytes, "bytes");
+    let written = assemble::write(&config.output, &mut manifest, &nodes, &blobs, &|bytes| {
+        progress.advance(bytes);
+        check()
+    })?;
+    phases.end();
+
+    for line in &warnings {
+        progress.warn(line);
+    }
+    let names =
+        std::iter::once("position").chain(manifest.attributes.iter().map(|a| a.name.as_str()));
+    Ok(BuildReport {
+        output: config.output.clone(),
+        points_read: read.points_read,
+        points_written: points,
+        dropped: read.dropped,
+        largest_coordinate_error: scan.rounding,
+        scale: choice.lattice.scale,
+        nodes: manifest.nodes,
+        levels: manifest.levels,
+        chunks: chunks as u64,
+        spilled,
+        seconds: phases.done,
+        total_seconds: begun.elapsed().as_secs_f64(),
+        peak_memory_bytes: memory::peak_bytes(),
+        file_bytes: written.file_bytes,
+        index_bytes: written.index_bytes,
+        columns: names
+            .zip(&ranges.column_bytes)
+            .map(|(name, &bytes)| ColumnBytes {
+                name: name.into(),
+                bytes,
+                bytes_per_point: bytes as f64 / points.max(1) as f64,
+            })
+            .collect(),
+        warnings,
+    })
+}
+
+/// Refuses before any work what cannot be written at its end.
+fn check_output(output: &Path, folder: &Path) -> Result<()> {
+    if output.is_dir() {
+        return Err(Error::Setup(format!(
+            "{}: is a folder; name a file, as in {}",
+            output.display(),
+            output.join("NAME.lods").display()
+        )));
+    }
+    tempfile::tempfile_in(folder).map_err(Error::io(folder, "cannot create files here"))?;
+    Ok(())
+}
+
+/// What reading found.
+struct Read {
+    schema: Schema,
+    writer: StoreWriter,
+    kinds: Vec<CoordinateKind>,
+    names: Vec<String>,
+    crs: Option<String>,
+    points_read: u64,
+    dropped: Vec<Dropped>,
+}
+
+fn read_all(
+    config: &BuildConfig,
+    opened: Vec<OpenedInput>,
+    folder: &Path,
+    check: &dyn Fn() -> Result<()>,
+    progress: &dyn Progress,
+    warnings: &mut Vec<String>,
+) -> Result<Read> {
+    let schema =
+        Schema::union(opened.iter().map(|i| &i.info.attributes[..]), &config.drop_attributes);
+    for name in &config.drop_attributes {
+        if !opened.iter().any(|i| i.info.attributes.iter().any(|a| a.name == *name)) {
+            return Err(Error::Setup(format!("--drop {name}: no input has this attribute")));
+        }
+    }
+    let mut read = Read {
+        writer: StoreWriter::new(opened.len(), config.memory_bytes / 2, folder),
+        kinds: Vec::new(),
+        names: Vec::new(),
+        crs: None,
+        points_read: 0,
+        dropped: Vec::new(),
+        schema,
+    };
+    for (index, input) in opened.into_iter().enumerate() {
+        let info = input.info;
+        for attribute in &read.schema.attributes {
+            if !info.attributes.iter().any(|a| a.name == attribute.name) {
+                let name = &attribute.name;
+                warnings.push(format!("{}: has no {name}; stored as zero", info.path));
+            }
+        }
+        match (&read.crs, &info.crs) {
+            (None, Some(crs)) => read.crs = Some(crs.clone()),
+            (Some(known), Some(crs)) if known != crs => warnings.push(format!(
+                "{}: its coordinate reference system differs from that of the inputs before; \
+                 coordinates are taken as they are",
+                info.path
+            )),
+            _ => {}
+        }
+        let map = RowMap::new(&info.attributes, &read.schema);
+        let (schema, writer) = (&read.schema, &mut read.writer);
+        let report = input.reader.read(&mut |block| {
+            check()?;
+            let count = block.positions.len();
+            let rows = map.apply(block.attributes, count, schema);
+            writer.push(RawBlock { input: index as u32, positions: block.positions, rows })?;
+            progress.advance(count as u64);
+            Ok(())
+        })?;
+        read.points_read += report.points_read;
+        for (reason, points) in report.dropped {
+            read.dropped.push(Dropped { reason: format!("{}: {reason}", info.path), points });
+        }
+        warnings.extend(report.warnings.iter().map(|line| format!("{}: {line}", info.path)));
+        read.kinds.push(match info.coordinates {
+            CoordinateKind::Float { single_precision, decimals } => CoordinateKind::Float {
+                decimals: report.decimals.or(decimals),
+                single_precision,
+            },
+            scaled => scaled,
+        });
+        read.names.push(inputs::display_name(&info.path));
+    }
+    Ok(read)
+}
+
+/// Attributes of which every byte is the same in every row.
+fn constant_attributes(schema: &Schema, constant_bytes: &[bool]) -> Vec<bool> {
+    schema
+        .attributes
+        .iter()
+        .zip(&schema.offsets)
+        .map(|(attribute, &offset)| {
+            let len = crate::schema::value_bytes(attribute);
+            // No points at all: nothing varies, but there is no value to keep either.
+            constant_bytes.get(offset..offset + len).is_some_and(|b| b.iter().all(|&c| c))
+        })
+        .collect()
+}
+
+fn check_chunks(plan: &Plan, memory_bytes: u64) -> Result<()> {
+    let Some(largest) = plan.chunks.iter().max_by_key(|c| c.points) else { return Ok(()) };
+    let needed = largest.points * CHUNK_BYTES_PER_POINT;
+    if largest.points > CHUNK_POINTS_MAX && needed > memory_bytes {
+        return Err(Error::Setup(format!(
+            "{} points coincide in one place; building them takes {} MiB: raise --memory",
+            largest.points,
+            needed >> 20
+        )));
+    }
+    Ok(())
+}
+
+fn fill_range(attribute: &mut lodestream_protocol::Attribute, components: &[(f64, f64)]) {
+    if let Some(value) = attribute.constant() {
+        let size = attribute.scalar.size_bytes();
+        let values = value.chunks_exact(size).map(|v| attribute.scalar.to_f64(v));
+        attribute.min = values.clone().collect();
+        attribute.max = values.collect();
+    } else if components.iter().all(|r| r.0.is_finite() && r.1.is_finite()) {
+        attribute.min = components.iter().map(|r| r.0).collect();
+        attribute.max = components.iter().map(|r| r.1).collect();
+    }
+    // JSON has no infinities: an attribute with NaN or infinite values may have no finite range.
+    if attribute.min.iter().chain(&attribute.max).any(|v| !v.is_finite()) {
+        attribute.min.clear();
+        attribute.max.clear();
+    }
+}
+
+struct Joined {
+    nodes: Vec<OutNode>,
+    buffers: Vec<Vec<u8>>,
+    ranges: Ranges,
+}
+
+/// Builds the tree above the chunks from what stands for each, and completes the chunks' roots.
+fn join<C: MortonCode>(context: &Context, roots: Vec<chunk::Root>, part: u32) -> Result<Joined> {
+    let lattice = &context.manifest.lattice;
+    let row_bytes = context.layout.row_bytes;
+    let mut codes: Vec<C> = Vec::new();
+    let mut leaves = Vec::with_capacity(roots.len());
+    for root in &roots {
+        let start = codes.len() as u32;
+        codes.extend(root.candidates.positions.iter().map(|&q| C::encode(q)));
+        leaves.push((root.key, start..codes.len() as u32));
+    }
+    let tree = Tree::above(&leaves);
+    let domain =
+        Domain { corner: [0; 3], bits: lattice.side_bits, grid_bits: context.grid_bits };
+    let sampled = poisson::sample(&tree, &codes, domain, &[]);
+    // A leaf of this tree is a chunk's root.
+    let root_index: HashMap<NodeKey, usize> =
+        leaves.iter().enumerate().map(|(i, (key, _))| (*key, i)).collect();
+    let root_of = |key: NodeKey| root_index.get(&key).copied();
+    let mut bounds: Vec<Vec<LatticeBox>> = vec![Vec::new(); tree.levels.len()];
+    for depth in (0..tree.levels.len()).rev() {
+        let boxes = tree.levels[depth].iter().map(|node| {
+            if node.is_leaf() {
+                return root_of(node.key).map_or(LatticeBox::EMPTY, |r| roots[r].bounds);
+            }
+            let mut tight = LatticeBox::EMPTY;
+            bounds[depth + 1][node.child_range()].iter().for_each(|b| tight.merge(b));
+            tight
+        });
+        bounds[depth] = boxes.collect();
+    }
+    let all: Vec<(usize, usize)> = (0..tree.levels.len())
+        .flat_map(|d| (0..tree.levels[d].len()).map(move |n| (d, n)))
+        .collect();
+    let row = |p: u32| -> &[u8] {
+        let chunk = leaves.partition_point(|(_, range)| range.end <= p);
+        let inside = (p - leaves[chunk].1.start) as usize;
+        &roots[chunk].candidates.rows[inside * row_bytes..][..row_bytes]
+    };
+    let encoded: Vec<(OutNode, Vec<Vec<u8>>, Ranges)> = all
+        .par_iter()
+        .map(|&(depth, index)| {
+            let node = &tree.levels[depth][index];
+            let own: Vec<u32> = sampled.points_of(&tree, depth, index).collect();
+            let mut encoder = NodeEncoder::new(context.layout);
+            let tight = bounds[depth][index];
+            let mut out = chunk::encode_node(
+                context,
+                &mut encoder,
+                node,
+                tight,
+                part,
+                &codes,
+                &own,
+                row,
+            )?;
+            if let Some(root) = node.is_leaf().then(|| root_of(node.key)).flatten() {
+                let guaranteed = context.manifest.spacing_world(node.key.level());
+                out.child_mask = roots[root].child_mask;
+                if out.child_mask != 0 {
+                    out.geometric_error = guaranteed as f32;
+                    out.spacing = guaranteed as f32;
+                } else {
+                    let mean = chunk::leaf_spacing(context, tight, roots[root].points);
+                    out.spacing = mean.min(guaranteed) as f32;
+                }
+            }
+            Ok((out, encoder.buffers, encoder.ranges))
+        })
+        .collect::<Result<_>>()?;
+    let mut joined = Joined {
+        nodes: Vec::with_capacity(encoded.len()),
+        buffers: vec![Vec::new(); context.layout.groups.len()],
+        ranges: Ranges::new(context.layout),
+    };
+    for (mut node, buffers, ranges) in encoded {
+        node.starts = joined.buffers.iter().map(|b| b.len() as u64).collect();
+        for (all, own) in joined.buffers.iter_mut().zip(&buffers) {
+            all.extend_from_slice(own);
+        }
+        joined.ranges.merge(&ranges);
+        joined.nodes.push(node);
+    }
+    Ok(joined)
+}

@@ -1,0 +1,236 @@
+//! From points to node payloads: gathers a node's columns and encodes them, group by group.
+
+use lodestream_protocol::{
+    Attribute, Domain, Error as FormatError, GroupInfo, LatticeBox, MortonCode, NodeKey,
+    ScalarType, encode_column, encode_positions,
+};
+
+use crate::{readers::InputAttribute, schema::Schema};
+
+/// Which columns the dataset stores, and where they are in the store's rows.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    /// The manifest's attributes; ranges are filled in at the end.
+    pub attributes: Vec<Attribute>,
+    /// Per attribute: where its value starts in a row.
+    pub offsets: Vec<usize>,
+    /// The manifest's groups; sizes are filled in at the end.
+    pub groups: Vec<GroupInfo>,
+    /// Bytes of a row.
+    pub row_bytes: usize,
+}
+
+/// The group an attribute belongs to: what views ask for together.
+fn group_name(attribute: &InputAttribute) -> &'static str {
+    match attribute.name.as_str() {
+        "color" => "base",
+        "normal" | "curvature" => "normal",
+        "intensity" => "intensity",
+        "classification" => "classification",
+        "gps_time" => "time",
+        "return_number" | "number_of_returns" | "scan_direction_flag" | "edge_of_flight_line"
+        | "synthetic" | "key_point" | "withheld" | "overlap" | "scanner_channel" | "user_data"
+        | "scan_angle" | "scan_angle_rank" | "point_source_id" => "scan",
+        _ => "extra",
+    }
+}
+
+impl Layout {
+    /// Lays out columns for the attributes of `schema`; those of which every value equals that in
+    /// `first_row` (`constant[i]`) are not stored.
+    pub fn new(schema: &Schema, constant: &[bool], first_row: &[u8]) -> Self {
+        let mut groups = vec![GroupInfo { name: "base".into(), bytes: 0 }];
+        let mut attributes = Vec::new();
+        for ((input, &offset), &constant) in
+            schema.attributes.iter().zip(&schema.offsets).zip(constant)
+        {
+            let value_bytes = crate::schema::value_bytes(input);
+            let storage = if constant {
+                Attribute::constant_storage(&first_row[offset..offset + value_bytes])
+            } else {
+                let name = group_name(input);
+                let group = groups.iter().position(|g| g.name == name).unwrap_or_else(|| {
+                    groups.push(GroupInfo { name: name.into(), bytes: 0 });
+                    groups.len() - 1
+                });
+                lodestream_protocol::Storage::Column { group }
+            };
+            attributes.push(Attribute {
+                name: input.name.clone(),
+                scalar: input.scalar,
+                components: input.components,
+                domain: Domain::Element,
+                storage,
+                min: Vec::new(),
+                max: Vec::new(),
+            });
+        }
+        Self { attributes, offsets: schema.offsets.clone(), groups, row_bytes: schema.row_bytes }
+    }
+}
+
+/// Smallest and largest value of every component of every attribute.
+#[derive(Debug, Clone)]
+pub struct Ranges {
+    /// Per attribute, per component.
+    pub components: Vec<Vec<(f64, f64)>>,
+    /// Encoded bytes per attribute (first: positions).
+    pub column_bytes: Vec<u64>,
+}
+
+impl Ranges {
+    /// No values yet.
+    pub fn new(layout: &Layout) -> Self {
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        let components =
+            layout.attributes.iter().map(|a| vec![none; usize::from(a.components)]).collect();
+        Self { components, column_bytes: vec![0; layout.attributes.len() + 1] }
+    }
+
+    /// Takes in another part's ranges.
+    pub fn merge(&mut self, other: &Self) {
+        let mine = self.components.iter_mut().flatten();
+        for (a, b) in mine.zip(other.components.iter().flatten()) {
+            *a = (a.0.min(b.0), a.1.max(b.1));
+        }
+        for (a, b) in self.column_bytes.iter_mut().zip(&other.column_bytes) {
+            *a += b;
+        }
+    }
+
+    fn grow(&mut self, attribute: usize, scalar: ScalarType, values: &[u8]) {
+        let ranges = &mut self.components[attribute];
+        let size = scalar.size_bytes();
+        let components = ranges.len();
+        // Integers of one and two bytes are the rule and worth a loop of their own.
+        macro_rules! narrow {
+            ($t:ty) => {{
+                for (c, range) in ranges.iter_mut().enumerate() {
+                    let (mut low, mut high) = (<$t>::MAX, <$t>::MIN);
+                    for value in values.chunks_exact(size * components) {
+                        let at = c * size;
+                        let v = bytemuck::pod_read_unaligned::<$t>(&value[at..at + size]);
+                        (low, high) = (low.min(v), high.max(v));
+                    }
+                    if !values.is_empty() {
+                        *range = (range.0.min(f64::from(low)), range.1.max(f64::from(high)));
+                    }
+                }
+            }};
+        }
+        match scalar {
+            ScalarType::U8 => narrow!(u8),
+            ScalarType::U16 if cfg!(target_endian = "little") => narrow!(u16),
+            _ => {
+                for value in values.chunks_exact(size * components) {
+                    for (range, v) in ranges.iter_mut().zip(value.chunks_exact(size)) {
+                        let v = scalar.to_f64(v);
+                        *range = (range.0.min(v), range.1.max(v));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Length and checksum of a node's payload of one group.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Payload {
+    /// Bytes.
+    pub bytes: u32,
+    /// CRC-32.
+    pub crc: u32,
+}
+
+/// Encodes nodes one after the other into one buffer per group.
+#[derive(Debug)]
+pub struct NodeEncoder<'a> {
+    layout: &'a Layout,
+    /// Encoded payloads, per group, back to back.
+    pub buffers: Vec<Vec<u8>>,
+    /// Ranges of all values encoded so far.
+    pub ranges: Ranges,
+    rows: Vec<u8>,
+    values: Vec<u8>,
+}
+
+impl<'a> NodeEncoder<'a> {
+    /// An encoder with empty buffers.
+    pub fn new(layout: &'a Layout) -> Self {
+        Self {
+            layout,
+            buffers: vec![Vec::new(); layout.groups.len()],
+            ranges: Ranges::new(layout),
+            rows: Vec::new(),
+            values: Vec::new(),
+        }
+    }
+
+    /// Encodes one node: `codes` are ascending and relative to the node, whose side is `bits` bits;
+    /// `row(i)` is the attribute row of point `i`.
+    ///
+    /// # Errors
+    /// [`FormatError`] where the node has too many points.
+    pub fn encode<'r, C: MortonCode>(
+        &mut self,
+        codes: &[C],
+        bits: u8,
+        row: impl Fn(usize) -> &'r [u8],
+    ) -> Result<Vec<Payload>, FormatError> {
+        if codes.is_empty() {
+            return Ok(vec![Payload::default(); self.buffers.len()]);
+        }
+        let starts: Vec<usize> = self.buffers.iter().map(Vec::len).collect();
+        encode_positions(&mut self.buffers[0], codes, bits)?;
+        self.ranges.column_bytes[0] += (self.buffers[0].len() - starts[0]) as u64;
+        self.rows.clear();
+        for i in 0..codes.len() {
+            self.rows.extend_from_slice(row(i));
+        }
+        for (index, attribute) in self.layout.attributes.iter().enumerate() {
+            let Some(group) = attribute.group() else { continue };
+            let (offset, len) = (self.layout.offsets[index], attribute.value_bytes());
+            self.values.clear();
+            for row in self.rows.chunks_exact(self.layout.row_bytes) {
+                self.values.extend_from_slice(&row[offset..offset + len]);
+            }
+            self.ranges.grow(index, attribute.scalar, &self.values);
+            let buffer = &mut self.buffers[group];
+            let before = buffer.len();
+            encode_column(buffer, attribute, &self.values)?;
+            self.ranges.column_bytes[index + 1] += (buffer.len() - before) as u64;
+        }
+        let payloads = self.buffers.iter().zip(starts).map(|(buffer, start)| {
+            let payload = &buffer[start..];
+            let bytes = u32::try_from(payload.len()).map_err(|_| FormatError::Corrupt {
+                what: "node",
+                why: "more than 4 GiB of payload".into(),
+            })?;
+            Ok(Payload { bytes, crc: crc32fast::hash(payload) })
+        });
+        payloads.collect()
+    }
+}
+
+/// A node that is ready to be written.
+#[derive(Debug, Clone)]
+pub struct OutNode {
+    /// Its cube.
+    pub key: NodeKey,
+    /// Octants of its children.
+    pub child_mask: u8,
+    /// Points in it.
+    pub points: u32,
+    /// Tight bounds of the points in it and below it.
+    pub bounds: LatticeBox,
+    /// World units; 0 for leaves.
+    pub geometric_error: f32,
+    /// World units.
+    pub spacing: f32,
+    /// Per group.
+    pub payloads: Vec<Payload>,
+    /// Which part of the build encoded it, and where its payloads start in that part's buffers.
+    pub part: u32,
+    /// See [`part`](Self::part).
+    pub starts: Vec<u64>,
+}
