@@ -190,12 +190,12 @@ macro_rules! with_scalar {
 
 /// A scalar that columns are made of.
 trait Scalar: Number + bytemuck::Pod {
-    fn from_le(self) -> Self;
+    fn swap_if_big_endian(self) -> Self;
 }
 
 macro_rules! impl_scalar {
     ($($t:ty),*) => { $(impl Scalar for $t {
-        fn from_le(self) -> Self { <$t>::from_le_bytes(bytemuck::bytes_of(&self).try_into().expect("own size")) }
+        fn swap_if_big_endian(self) -> Self { <$t>::from_le_bytes(bytemuck::bytes_of(&self).try_into().expect("own size")) }
     })* };
 }
 impl_scalar!(u8, i8, u16, i16, u32, i32, u64, i64, f32, f64);
@@ -205,7 +205,7 @@ fn component<T: Scalar>(values: &[u8], component: usize, components: usize) -> V
     let size = size_of::<T>();
     values
         .chunks_exact(size * components)
-        .map(|v| bytemuck::pod_read_unaligned::<T>(&v[component * size..][..size]).from_le())
+        .map(|v| bytemuck::pod_read_unaligned::<T>(&v[component * size..][..size]).swap_if_big_endian())
         .collect()
 }
 
@@ -376,7 +376,7 @@ fn decode_color<T: Scalar + Default>(
 
 fn to_le_bytes<T: Scalar>(mut values: Vec<T>) -> Vec<u8> {
     if cfg!(target_endian = "big") {
-        values.iter_mut().for_each(|v| *v = v.from_le());
+        values.iter_mut().for_each(|v| *v = v.swap_if_big_endian());
     }
     bytemuck::cast_slice(&values).to_vec()
 }

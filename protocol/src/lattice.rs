@@ -88,10 +88,14 @@ impl LatticeBox {
 
     /// Grows the box to hold `q`.
     pub fn grow(&mut self, q: [u32; 3]) {
-        for a in 0..3 {
-            self.min[a] = self.min[a].min(q[a]);
-            self.max[a] = self.max[a].max(q[a]);
-        }
+        self.min = std::array::from_fn(|a| self.min[a].min(q[a]));
+        self.max = std::array::from_fn(|a| self.max[a].max(q[a]));
+    }
+
+    /// Grows the box to hold all that `other` holds.
+    pub fn merge(&mut self, other: &Self) {
+        self.min = std::array::from_fn(|a| self.min[a].min(other.min[a]));
+        self.max = std::array::from_fn(|a| self.max[a].max(other.max[a]));
     }
 
     /// Whether `q` is inside.

@@ -11,14 +11,14 @@ pub trait MortonCode: Copy + Ord + Send + Sync + std::fmt::Debug + 'static {
     fn encode(q: [u32; 3]) -> Self;
     /// Undoes [`encode`](Self::encode).
     fn decode(self) -> [u32; 3];
-    /// The code `axis_bits` levels up: `self >> 3 * axis_bits`.
+    /// The code of the cube `axis_bits` levels up that holds this one: `self >> 3 * axis_bits`.
     #[must_use]
     fn up(self, axis_bits: u8) -> Self;
     /// Bits `shift ..` truncated to u64.
     fn low_u64(self, shift: u8) -> u64;
-    /// The smallest code of the next cube of `axis_bits` levels, saturating at the largest code.
+    /// The code within its cube of `axis_bits` levels: the low `3 * axis_bits` bits.
     #[must_use]
-    fn end_of_cube(self, axis_bits: u8) -> Option<Self>;
+    fn within(self, axis_bits: u8) -> Self;
 }
 
 const fn spread(v: u32) -> u64 {
@@ -70,9 +70,9 @@ impl MortonCode for u64 {
         self.checked_shr(u32::from(shift)).unwrap_or(0)
     }
 
-    fn end_of_cube(self, axis_bits: u8) -> Option<Self> {
-        let shift = 3 * u32::from(axis_bits);
-        (self.checked_shr(shift)? + 1).checked_mul(1u64.checked_shl(shift)?)
+    fn within(self, axis_bits: u8) -> Self {
+        let cut = 1u64.checked_shl(3 * u32::from(axis_bits));
+        cut.map_or(self, |cut| self & (cut - 1))
     }
 }
 
@@ -99,9 +99,9 @@ impl MortonCode for u128 {
         self.checked_shr(u32::from(shift)).unwrap_or(0) as u64
     }
 
-    fn end_of_cube(self, axis_bits: u8) -> Option<Self> {
-        let shift = 3 * u32::from(axis_bits);
-        (self.checked_shr(shift)? + 1).checked_mul(1u128.checked_shl(shift)?)
+    fn within(self, axis_bits: u8) -> Self {
+        let cut = 1u128.checked_shl(3 * u32::from(axis_bits));
+        cut.map_or(self, |cut| self & (cut - 1))
     }
 }
 
