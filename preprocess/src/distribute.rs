@@ -1,12 +1,13 @@
 //! Points to their chunks: as places in the store while that is in memory, else as records copied
 //! into one temporary file in which every chunk has its own stretch.
 
-use std::{fs::File, path::Path};
+use std::{fs::File, path::Path, sync::Mutex};
 
 use rayon::prelude::*;
 
 use crate::{
     chunk::Points,
+    encode::Layout,
     error::{Error, Result},
     plan::{Counter, Plan},
     positioned::{read_exact_at, write_all_at},
@@ -135,8 +136,9 @@ fn split(blocks: &[Block]) -> Vec<&[Block]> {
 /// Every chunk's points.
 #[derive(Debug)]
 pub enum Distributed {
-    /// The store's blocks, and per chunk the places `block << 16 | point` in parts, ascending.
-    InStore(Vec<Block>, Vec<Vec<Vec<u32>>>),
+    /// The store's blocks, and per chunk the places `block << 16 | point` in parts, ascending, until
+    /// they are asked for.
+    InStore(Vec<Block>, Vec<Mutex<Vec<Vec<u32>>>>),
     /// Records (position, row) in a temporary file; per chunk its first record.
     Copied {
         /// The file.
@@ -155,13 +157,14 @@ pub enum Distributed {
 pub fn distribute(
     store: Store,
     plan: &Plan,
-    row_bytes: usize,
+    layout: &Layout,
     folder: &Path,
     buffer_bytes: u64,
     check: &(dyn Fn() -> Result<()> + Sync),
 ) -> Result<Distributed> {
     match store {
-        Store::Memory { blocks, .. } => {
+        Store::Memory { mut blocks, .. } => {
+            blocks.par_iter_mut().for_each(|b| b.rows = layout.cut(std::mem::take(&mut b.rows)));
             let part_len = blocks.len().div_ceil(rayon::current_num_threads()).max(1);
             let parts: Vec<Vec<Vec<u32>>> = split(&blocks)
                 .into_par_iter()
@@ -190,12 +193,13 @@ pub fn distribute(
                     chunk.push(places);
                 }
             }
-            Ok(Distributed::InStore(blocks, chunks))
+            Ok(Distributed::InStore(blocks, chunks.into_iter().map(Mutex::new).collect()))
         }
         Store::File(mut spilled) => {
             let failed = |e| Error::io(folder, "cannot write a temporary file")(e);
             let file = tempfile::tempfile_in(folder)
                 .map_err(Error::io(folder, "cannot create a temporary file"))?;
+            let row_bytes = layout.row_bytes;
             let record_bytes = 12 + row_bytes;
             let mut total = 0;
             let first: Vec<u64> = plan
@@ -212,11 +216,12 @@ pub fn distribute(
             let mut cursors: Vec<u64> = first.iter().map(|f| f * record_bytes as u64).collect();
             let mut buffers: Vec<Vec<u8>> = vec![Vec::new(); plan.chunks.len()];
             spilled.stream(|block| {
+                let rows = layout.cut(block.rows);
                 for (p, &q) in block.positions.iter().enumerate() {
                     let chunk = plan.chunk_of(q);
                     let buffer = &mut buffers[chunk];
                     buffer.extend_from_slice(bytemuck::cast_slice(&q));
-                    buffer.extend_from_slice(&block.rows[p * row_bytes..][..row_bytes]);
+                    buffer.extend_from_slice(&rows[p * row_bytes..][..row_bytes]);
                     if buffer.len() + record_bytes > buffer_bytes {
                         write_all_at(&file, buffer, cursors[chunk]).map_err(failed)?;
                         cursors[chunk] += buffer.len() as u64;
@@ -234,13 +239,16 @@ pub fn distribute(
 }
 
 impl Distributed {
-    /// The points of one chunk.
+    /// The points of one chunk; each chunk is asked for once.
     ///
     /// # Errors
     /// Where the temporary file cannot be read.
     pub fn points(&self, plan: &Plan, chunk: usize, folder: &Path) -> Result<Points<'_>> {
         match self {
-            Self::InStore(blocks, chunks) => Ok(Points::InStore(blocks, chunks[chunk].concat())),
+            Self::InStore(blocks, chunks) => {
+                let parts = std::mem::take(&mut *chunks[chunk].lock().expect("no holder panics"));
+                Ok(Points::InStore(blocks, parts.concat()))
+            }
             Self::Copied { file, first, row_bytes } => {
                 let points = plan.chunks[chunk].points as usize;
                 let record_bytes = 12 + row_bytes;

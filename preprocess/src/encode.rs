@@ -12,12 +12,16 @@ use crate::{readers::InputAttribute, schema::Schema};
 pub struct Layout {
     /// The manifest's attributes; ranges are filled in at the end.
     pub attributes: Vec<Attribute>,
-    /// Per attribute: where its value starts in a row.
+    /// Per attribute: where its value starts in a cut row.
     pub offsets: Vec<usize>,
     /// The manifest's groups; sizes are filled in at the end.
     pub groups: Vec<GroupInfo>,
-    /// Bytes of a row.
+    /// Bytes of a cut row: what varies.
     pub row_bytes: usize,
+    /// What is kept of a row of the store.
+    kept: Vec<std::ops::Range<usize>>,
+    /// Bytes of a row of the store.
+    store_row_bytes: usize,
 }
 
 /// The group an attribute belongs to: what views ask for together.
@@ -37,14 +41,22 @@ fn group_name(attribute: &InputAttribute) -> &'static str {
 
 impl Layout {
     /// Lays out columns for the attributes of `schema`; those of which every value equals that in
-    /// `first_row` (`constant[i]`) are not stored.
+    /// `first_row` (`constant[i]`) are not stored, and rows are cut to the others.
     pub fn new(schema: &Schema, constant: &[bool], first_row: &[u8]) -> Self {
+        let mut row_bytes = 0;
+        let mut offsets = Vec::new();
+        let mut kept = Vec::new();
         let mut groups = vec![GroupInfo { name: "base".into(), bytes: 0 }];
         let mut attributes = Vec::new();
         for ((input, &offset), &constant) in
             schema.attributes.iter().zip(&schema.offsets).zip(constant)
         {
             let value_bytes = crate::schema::value_bytes(input);
+            offsets.push(row_bytes);
+            if !constant {
+                kept.push(offset..offset + value_bytes);
+                row_bytes += value_bytes;
+            }
             let storage = if constant {
                 Attribute::constant_storage(&first_row[offset..offset + value_bytes])
             } else {
@@ -65,7 +77,29 @@ impl Layout {
                 max: Vec::new(),
             });
         }
-        Self { attributes, offsets: schema.offsets.clone(), groups, row_bytes: schema.row_bytes }
+        Self { attributes, offsets, groups, row_bytes, kept, store_row_bytes: schema.row_bytes }
+    }
+
+    /// Rows of the store cut to what varies.
+    pub fn cut(&self, rows: Vec<u8>) -> Vec<u8> {
+        if self.row_bytes == self.store_row_bytes {
+            return rows;
+        }
+        if self.row_bytes == 0 {
+            return Vec::new();
+        }
+        let mut cut = Vec::with_capacity(rows.len() / self.store_row_bytes * self.row_bytes);
+        for row in rows.chunks_exact(self.store_row_bytes) {
+            for kept in &self.kept {
+                match kept.len() {
+                    // A byte or two is a move, not a call.
+                    1 => cut.push(row[kept.start]),
+                    2 => cut.extend_from_slice(&[row[kept.start], row[kept.start + 1]]),
+                    _ => cut.extend_from_slice(&row[kept.clone()]),
+                }
+            }
+        }
+        cut
     }
 }
 
@@ -184,16 +218,14 @@ impl<'a> NodeEncoder<'a> {
         encode_positions(&mut self.buffers[0], codes, bits)?;
         self.ranges.column_bytes[0] += (self.buffers[0].len() - starts[0]) as u64;
         self.rows.clear();
+        self.rows.reserve(codes.len() * self.layout.row_bytes);
         for i in 0..codes.len() {
             self.rows.extend_from_slice(row(i));
         }
         for (index, attribute) in self.layout.attributes.iter().enumerate() {
             let Some(group) = attribute.group() else { continue };
             let (offset, len) = (self.layout.offsets[index], attribute.value_bytes());
-            self.values.clear();
-            for row in self.rows.chunks_exact(self.layout.row_bytes) {
-                self.values.extend_from_slice(&row[offset..offset + len]);
-            }
+            gather(&self.rows, self.layout.row_bytes, offset, len, &mut self.values);
             self.ranges.grow(index, attribute.scalar, &self.values);
             let buffer = &mut self.buffers[group];
             let before = buffer.len();
@@ -209,6 +241,34 @@ impl<'a> NodeEncoder<'a> {
             Ok(Payload { bytes, crc: crc32fast::hash(payload) })
         });
         payloads.collect()
+    }
+}
+
+/// The values of `len` bytes at `offset` of every row.
+fn gather(rows: &[u8], row_bytes: usize, offset: usize, len: usize, values: &mut Vec<u8>) {
+    /// Copies of a length known to the compiler take no call each.
+    fn fixed<const N: usize>(rows: &[u8], row_bytes: usize, offset: usize, values: &mut Vec<u8>) {
+        for row in rows.chunks_exact(row_bytes) {
+            if let Some(value) = row.get(offset..).and_then(|r| r.first_chunk::<N>()) {
+                values.extend_from_slice(value);
+            }
+        }
+    }
+    values.clear();
+    values.reserve(rows.len() / row_bytes * len);
+    match len {
+        1 => fixed::<1>(rows, row_bytes, offset, values),
+        2 => fixed::<2>(rows, row_bytes, offset, values),
+        3 => fixed::<3>(rows, row_bytes, offset, values),
+        4 => fixed::<4>(rows, row_bytes, offset, values),
+        6 => fixed::<6>(rows, row_bytes, offset, values),
+        8 => fixed::<8>(rows, row_bytes, offset, values),
+        12 => fixed::<12>(rows, row_bytes, offset, values),
+        _ => {
+            for row in rows.chunks_exact(row_bytes) {
+                values.extend_from_slice(&row[offset..offset + len]);
+            }
+        }
     }
 }
 

@@ -29,7 +29,8 @@ pub fn open_all(inputs: &[String], columns: Option<&str>) -> Result<Vec<OpenedIn
     let mut opened = Vec::new();
     for input in inputs {
         if input.starts_with("sim:") {
-            return Err(Error::input(input, "simulated scans are not built in yet"));
+            opened.push(opened_input(readers::sim::open(input)?));
+            continue;
         }
         let path = Path::new(input);
         if path.is_dir() {
@@ -94,6 +95,8 @@ fn open_file(path: &Path, columns: Option<&str>) -> Result<OpenedInput> {
         match ending(path).as_str() {
             "las" | "laz" => readers::las::open(path)?,
             "ply" => readers::ply::open(path)?,
+            "xyz" | "csv" | "txt" | "pts" | "asc" => readers::text::open(path, columns)?,
+            _ if columns.is_some() => readers::text::open(path, columns)?,
             other => {
                 return Err(Error::input(
                     shown,

@@ -22,6 +22,7 @@ pub mod readers;
 mod schedule;
 mod schema;
 mod sort;
+pub mod sim;
 mod store;
 mod tree;
 

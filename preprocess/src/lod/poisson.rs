@@ -11,8 +11,9 @@
 //! that are sampled independently, [`Skin`]s carry the accepted points near the border.
 //!
 //! Candidates come in Morton order, so the points of a cell are neighbours in memory, and so are
-//! those of a *brick* of 4³ cells. The 27 bricks around are looked up once a brick, the neighbour
-//! cells once a cell, and most candidates fall to a point of their own cell at once.
+//! those of a *brick* of 4³ cells. The 27 bricks around are looked up once a brick. A brick keeps a
+//! bit for each of its cells with accepted points, so the neighbour cells of a cell are found by
+//! masking at most eight words, once a cell, and most candidates fall to a point of their own cell.
 //!
 //! All distances are integers: nothing is lost at any offset or scale.
 
@@ -27,11 +28,24 @@ use crate::tree::{Tree, TreeNode};
 const BRICK_BITS: u8 = 2;
 const BRICK_SIDE: u32 = 1 << BRICK_BITS;
 const BRICK_CELLS: usize = 1 << (3 * BRICK_BITS);
-/// A cell's entry: index of its first accepted point shifted by this, plus their number. Points that
-/// keep a cell's side from one another are at most 8 in it.
-const COUNT_BITS: u32 = 4;
-const COUNT_MASK: u64 = (1 << COUNT_BITS) - 1;
 
+/// 4³ cells, by their Morton code inside the brick.
+#[derive(Clone)]
+struct Brick {
+    /// Cells with accepted points.
+    occupied: u64,
+    /// Per occupied cell: its first accepted point,
+    start: [u32; BRICK_CELLS],
+    /// and how many there are: at most 8, as they keep a cell's side from one another.
+    count: [u8; BRICK_CELLS],
+}
+
+impl Brick {
+    const EMPTY: Self = Self { occupied: 0, start: [0; BRICK_CELLS], count: [0; BRICK_CELLS] };
+}
+
+/// The cells around one cell: per touched brick (among the 27 around) the bits of its cells.
+type Around = [(u8, u64); 8];
 /// Accepted points near the border of a chunk, level by level: what its neighbours must respect.
 #[derive(Debug, Clone, Default)]
 pub struct Skin {
@@ -195,7 +209,7 @@ struct Grid<C> {
     /// Bricks by their coordinates, which are biased by one so that the bricks just outside the
     /// domain have coordinates too.
     map: BrickMap,
-    bricks: Vec<[u64; BRICK_CELLS]>,
+    bricks: Vec<Brick>,
     /// Accepted positions, lattice units relative to the root cube; those of a cell in a row.
     accepted: Vec<[u32; 3]>,
     /// The brick at hand and the bricks around it, as 3x3x3 with x fastest.
@@ -207,7 +221,7 @@ struct Grid<C> {
     cell_start: usize,
     nearby: Vec<[u32; 3]>,
     nearby_known: bool,
-    neighbours: &'static [[(u8, u8); 26]; BRICK_CELLS],
+    neighbours: &'static [Around; BRICK_CELLS],
 }
 
 impl<C: MortonCode> Grid<C> {
@@ -257,8 +271,11 @@ impl<C: MortonCode> Grid<C> {
             let cell = same_cell[0].0;
             let brick = self.brick_at(cell.map(|c| c >> BRICK_BITS));
             let local = cell.map(|c| (c as u32) & (BRICK_SIDE - 1));
-            let entry = (self.accepted.len() as u64) << COUNT_BITS | same_cell.len() as u64;
-            self.bricks[brick as usize][morton_encode(local) as usize] = entry;
+            let cell = morton_encode(local) as usize;
+            let brick = &mut self.bricks[brick as usize];
+            brick.occupied |= 1 << cell;
+            brick.start[cell] = self.accepted.len() as u32;
+            brick.count[cell] = same_cell.len() as u8;
             self.accepted.extend(same_cell.iter().map(|(_, position)| position));
         }
     }
@@ -269,7 +286,7 @@ impl<C: MortonCode> Grid<C> {
 
     fn brick_at(&mut self, coords: [u64; 3]) -> u32 {
         *self.map.entry(Self::key(coords)).or_insert_with(|| {
-            self.bricks.push([0; BRICK_CELLS]);
+            self.bricks.push(Brick::EMPTY);
             (self.bricks.len() - 1) as u32
         })
     }
@@ -296,9 +313,10 @@ impl<C: MortonCode> Grid<C> {
             return None;
         }
         self.accepted.push(position);
-        let count = (self.accepted.len() - self.cell_start) as u64;
-        let brick = self.around[13] as usize;
-        self.bricks[brick][self.cell_in_brick] = (self.cell_start as u64) << COUNT_BITS | count;
+        let brick = &mut self.bricks[self.around[13] as usize];
+        brick.occupied |= 1 << self.cell_in_brick;
+        brick.start[self.cell_in_brick] = self.cell_start as u32;
+        brick.count[self.cell_in_brick] += 1;
         Some(position)
     }
 
@@ -325,15 +343,21 @@ impl<C: MortonCode> Grid<C> {
     fn gather_nearby(&mut self) {
         self.nearby.clear();
         self.nearby_known = true;
-        for &(step, cell) in &self.neighbours[self.cell_in_brick] {
+        for &(step, cells) in &self.neighbours[self.cell_in_brick] {
             let brick = self.around[usize::from(step)];
+            if cells == 0 {
+                break;
+            }
             if brick == NO_BRICK {
                 continue;
             }
-            let entry = self.bricks[brick as usize][usize::from(cell)];
-            if entry != 0 {
-                let start = (entry >> COUNT_BITS) as usize;
-                let end = start + (entry & COUNT_MASK) as usize;
+            let brick = &self.bricks[brick as usize];
+            let mut cells = brick.occupied & cells;
+            while cells != 0 {
+                let cell = cells.trailing_zeros() as usize;
+                cells &= cells - 1;
+                let start = brick.start[cell] as usize;
+                let end = start + usize::from(brick.count[cell]);
                 self.nearby.extend_from_slice(&self.accepted[start..end]);
             }
         }
@@ -360,25 +384,26 @@ fn distance2(a: [u32; 3], b: [u32; 3]) -> u64 {
         .sum()
 }
 
-/// For each cell of a brick its 26 neighbours: (brick among the 27 around, cell therein).
-fn cell_neighbours() -> &'static [[(u8, u8); 26]; BRICK_CELLS] {
-    static TABLE: std::sync::OnceLock<Box<[[(u8, u8); 26]; BRICK_CELLS]>> =
-        std::sync::OnceLock::new();
+/// For each cell of a brick its 26 neighbours, by the bricks that they lie in.
+fn cell_neighbours() -> &'static [Around; BRICK_CELLS] {
+    static TABLE: std::sync::OnceLock<Box<[Around; BRICK_CELLS]>> = std::sync::OnceLock::new();
     TABLE.get_or_init(|| {
-        let mut table = Box::new([[(0, 0); 26]; BRICK_CELLS]);
-        for (cell, neighbours) in table.iter_mut().enumerate() {
+        let mut table = Box::new([[(0, 0); 8]; BRICK_CELLS]);
+        for (cell, around) in table.iter_mut().enumerate() {
             let at = morton_decode(cell as u64);
-            let steps = (0..27u32).filter(|&s| s != 13);
-            for (slot, step) in neighbours.iter_mut().zip(steps) {
+            let mut cells = [0u64; 27];
+            for step in (0..27u32).filter(|&s| s != 13) {
                 let step = [step % 3, step / 3 % 3, step / 9];
                 // Biased by a brick side, less the step's own bias of one.
                 let moved: [u32; 3] = std::array::from_fn(|a| at[a] + step[a] + BRICK_SIDE - 1);
                 let brick = moved.map(|m| m >> BRICK_BITS);
                 let inside = moved.map(|m| m & (BRICK_SIDE - 1));
-                *slot = (
-                    (brick[0] + 3 * brick[1] + 9 * brick[2]) as u8,
-                    morton_encode(inside) as u8,
-                );
+                let brick = (brick[0] + 3 * brick[1] + 9 * brick[2]) as usize;
+                cells[brick] |= 1 << morton_encode(inside);
+            }
+            let touched = cells.iter().enumerate().filter(|(_, cells)| **cells != 0);
+            for (slot, (brick, &cells)) in around.iter_mut().zip(touched) {
+                *slot = (brick as u8, cells);
             }
         }
         table
