@@ -136,11 +136,8 @@ pub fn write(
     for group in 0..groups {
         for (page, offsets) in pages.iter().zip(&mut group_offsets) {
             offsets[group] = offset;
-            offset += page
-                .nodes
-                .iter()
-                .map(|&i| u64::from(nodes[i].payloads[group].bytes))
-                .sum::<u64>();
+            offset +=
+                page.nodes.iter().map(|&i| u64::from(nodes[i].payloads[group].bytes)).sum::<u64>();
         }
     }
     let payload_bytes = offset;
@@ -154,8 +151,9 @@ pub fn write(
         for &(place, child) in &page.children {
             wire[place].child_page = refs[child];
         }
-        let bytes = HierarchyPage::encode(&wire, group_offsets[index].clone(), &manifest.lattice)
-            .map_err(|source| Error::Format { path: output.display().to_string(), source })?;
+        let bytes =
+            HierarchyPage::encode(&wire, group_offsets[index].clone(), &manifest.lattice)
+                .map_err(|source| Error::Format { path: output.display().to_string(), source })?;
         if index > 0 {
             refs[index] = Some(PageRef {
                 offset: payload_bytes + tail.len() as u64,

@@ -240,8 +240,7 @@ fn build_in_pool(
     };
     check_output(&config.output, folder)?;
     let mut warnings: Vec<String> = Vec::new();
-    let mut phases =
-        Phases { progress, started: begun, done: Vec::new(), name: String::new() };
+    let mut phases = Phases { progress, started: begun, done: Vec::new(), name: String::new() };
 
     let opened = inputs::open_all(&config.inputs, config.columns.as_deref())?;
     for input in &opened {
@@ -490,10 +489,9 @@ fn read_all(
         }
         warnings.extend(report.warnings.iter().map(|line| format!("{}: {line}", info.path)));
         read.kinds.push(match info.coordinates {
-            CoordinateKind::Float { single_precision, decimals } => CoordinateKind::Float {
-                decimals: report.decimals.or(decimals),
-                single_precision,
-            },
+            CoordinateKind::Float { single_precision, decimals } => {
+                CoordinateKind::Float { decimals: report.decimals.or(decimals), single_precision }
+            }
             scaled => scaled,
         });
         read.names.push(inputs::display_name(&info.path));
@@ -563,8 +561,7 @@ fn join<C: MortonCode>(context: &Context, roots: Vec<chunk::Root>, part: u32) ->
         leaves.push((root.key, start..codes.len() as u32));
     }
     let tree = Tree::above(&leaves);
-    let domain =
-        Domain { corner: [0; 3], bits: lattice.side_bits, grid_bits: context.grid_bits };
+    let domain = Domain { corner: [0; 3], bits: lattice.side_bits, grid_bits: context.grid_bits };
     let sampled = poisson::sample(&tree, &codes, domain, &[]);
     // A leaf of this tree is a chunk's root.
     let root_index: HashMap<NodeKey, usize> =
@@ -597,16 +594,8 @@ fn join<C: MortonCode>(context: &Context, roots: Vec<chunk::Root>, part: u32) ->
             let own: Vec<u32> = sampled.points_of(&tree, depth, index).collect();
             let mut encoder = NodeEncoder::new(context.layout);
             let tight = bounds[depth][index];
-            let mut out = chunk::encode_node(
-                context,
-                &mut encoder,
-                node,
-                tight,
-                part,
-                &codes,
-                &own,
-                row,
-            )?;
+            let mut out =
+                chunk::encode_node(context, &mut encoder, node, tight, part, &codes, &own, row)?;
             if let Some(root) = node.is_leaf().then(|| root_of(node.key)).flatten() {
                 let guaranteed = context.manifest.spacing_world(node.key.level());
                 out.child_mask = roots[root].child_mask;

@@ -211,8 +211,8 @@ pub fn distribute(
                     start
                 })
                 .collect();
-            let buffer_bytes = (buffer_bytes / plan.chunks.len().max(1) as u64)
-                .clamp(4 << 10, 256 << 10) as usize;
+            let buffer_bytes =
+                (buffer_bytes / plan.chunks.len().max(1) as u64).clamp(4 << 10, 256 << 10) as usize;
             let mut cursors: Vec<u64> = first.iter().map(|f| f * record_bytes as u64).collect();
             let mut buffers: Vec<Vec<u8>> = vec![Vec::new(); plan.chunks.len()];
             spilled.stream(|block| {

@@ -32,9 +32,19 @@ fn group_name(attribute: &InputAttribute) -> &'static str {
         "intensity" => "intensity",
         "classification" => "classification",
         "gps_time" => "time",
-        "return_number" | "number_of_returns" | "scan_direction_flag" | "edge_of_flight_line"
-        | "synthetic" | "key_point" | "withheld" | "overlap" | "scanner_channel" | "user_data"
-        | "scan_angle" | "scan_angle_rank" | "point_source_id" => "scan",
+        "return_number"
+        | "number_of_returns"
+        | "scan_direction_flag"
+        | "edge_of_flight_line"
+        | "synthetic"
+        | "key_point"
+        | "withheld"
+        | "overlap"
+        | "scanner_channel"
+        | "user_data"
+        | "scan_angle"
+        | "scan_angle_rank"
+        | "point_source_id" => "scan",
         _ => "extra",
     }
 }

@@ -161,7 +161,8 @@ pub fn choose(inputs: &[InputCoordinates], points: u64, step: Option<f64>) -> Re
 }
 
 fn choose_exact(inputs: &[InputCoordinates], filled: &[&InputCoordinates]) -> Option<Choice> {
-    let own: Vec<OwnLattice> = filled.iter().map(|i| own_lattice(&i.kind)).collect::<Option<_>>()?;
+    let own: Vec<OwnLattice> =
+        filled.iter().map(|i| own_lattice(&i.kind)).collect::<Option<_>>()?;
     let exponent =
         own.iter().flat_map(|o| o.scale.iter().chain(&o.offset)).map(|d| d.exponent).min()?;
     let first = own[0].offset;
@@ -170,9 +171,8 @@ fn choose_exact(inputs: &[InputCoordinates], filled: &[&InputCoordinates]) -> Op
     for o in &own {
         for a in 0..3 {
             common = gcd(common, o.scale[a].at_exponent(exponent)?);
-            let apart = o.offset[a]
-                .at_exponent(exponent)?
-                .checked_sub(first[a].at_exponent(exponent)?)?;
+            let apart =
+                o.offset[a].at_exponent(exponent)?.checked_sub(first[a].at_exponent(exponent)?)?;
             common = gcd(common, apart);
         }
     }
@@ -180,53 +180,71 @@ fn choose_exact(inputs: &[InputCoordinates], filled: &[&InputCoordinates]) -> Op
         return None;
     }
     let scale = Decimal { mantissa: common, exponent }.to_f64();
-    let affine = |o: &OwnLattice| -> Option<([i64; 3], [i64; 3])> {
-        let mut factor = [0; 3];
-        let mut shift = [0; 3];
-        for a in 0..3 {
-            factor[a] = i64::try_from(o.scale[a].at_exponent(exponent)? / common).ok()?;
-            let apart = o.offset[a].at_exponent(exponent)? - first[a].at_exponent(exponent)?;
-            shift[a] = i64::try_from(apart / common).ok()?;
-        }
-        Some((factor, shift))
-    };
+    // The root cube's corner is not known yet: its origin is zero for now.
+    let offset: [f64; 3] = std::array::from_fn(|a| first[a].to_f64());
+    let mut lattice = Lattice { scale, offset, origin: [0; 3], side_bits: 0 };
     // A float input with known decimals is rounded to the lattice point that it means.
     let is_float = |kind: &CoordinateKind| matches!(kind, CoordinateKind::Float { .. });
-    let offset: [f64; 3] = std::array::from_fn(|a| first[a].to_f64());
     let mut low = [i64::MAX; 3];
     let mut high = [i64::MIN; 3];
-    for (input, o) in filled.iter().zip(&own) {
-        let (factor, shift) = affine(o)?;
+    for input in filled {
+        let placement = placement_on(&lattice, input);
         for a in 0..3 {
             let place = |native: f64| -> Option<i64> {
-                if is_float(&input.kind) {
-                    let steps = ((native - offset[a]) / scale).round();
-                    return (steps.abs() < 9e15).then_some(steps as i64);
+                match placement {
+                    Placement::Exact { factor, shift } => {
+                        (native as i64).checked_mul(factor[a])?.checked_add(shift[a])
+                    }
+                    Placement::Rounded { .. } if is_float(&input.kind) => {
+                        let steps = ((native - offset[a]) / scale).round();
+                        (steps.abs() < 9e15).then_some(steps as i64)
+                    }
+                    Placement::Rounded { .. } => None,
                 }
-                (native as i64).checked_mul(factor[a])?.checked_add(shift[a])
             };
             low[a] = low[a].min(place(input.bounds.min[a])?);
             high[a] = high[a].max(place(input.bounds.max[a])?);
         }
     }
-    let side_bits = side_bits_for(low, high)?;
-    let lattice = Lattice { scale, offset, origin: low, side_bits };
+    lattice.side_bits = side_bits_for(low, high)?;
+    lattice.origin = low;
     if !lattice.is_valid() {
         return None;
     }
-    let placements = inputs
-        .iter()
-        .map(|input| {
-            if is_float(&input.kind) {
-                return Some(Placement::Rounded { scale: [1.0; 3], offset: [0.0; 3] });
-            }
-            let (factor, shift) = affine(&own_lattice(&input.kind)?)?;
-            let shift = std::array::from_fn(|a| shift[a] - low[a]);
-            Some(Placement::Exact { factor, shift })
-        })
-        .map(|p| p.or(Some(Placement::Exact { factor: [1; 3], shift: [0; 3] })))
-        .collect::<Option<_>>()?;
+    let placements = inputs.iter().map(|input| placement_on(&lattice, input)).collect();
     Some(Choice { lattice, placements, note: None })
+}
+
+/// How an input goes onto a lattice that is given: exactly, where its own steps are whole multiples of
+/// the lattice's.
+pub fn placement_on(lattice: &Lattice, input: &InputCoordinates) -> Placement {
+    let (scale, offset) = world_of(&input.kind);
+    let rounded = Placement::Rounded { scale, offset };
+    if matches!(input.kind, CoordinateKind::Float { .. }) {
+        return rounded;
+    }
+    exact_placement(lattice, &input.kind).unwrap_or(rounded)
+}
+
+fn exact_placement(lattice: &Lattice, kind: &CoordinateKind) -> Option<Placement> {
+    let own = own_lattice(kind)?;
+    let step = Decimal::of(lattice.scale)?;
+    let mut factor = [0; 3];
+    let mut shift = [0; 3];
+    for a in 0..3 {
+        let zero = Decimal::of(lattice.offset[a])?;
+        let parts = [own.scale[a], own.offset[a], step, zero];
+        let exponent = parts.iter().map(|d| d.exponent).min()?;
+        let [scale, offset, step, zero] = parts.map(|d| d.at_exponent(exponent));
+        let (scale, step) = (scale?, step?);
+        let apart = offset?.checked_sub(zero?)?;
+        if step == 0 || scale % step != 0 || apart % step != 0 {
+            return None;
+        }
+        factor[a] = i64::try_from(scale / step).ok()?;
+        shift[a] = i64::try_from(apart / step).ok()?.checked_sub(lattice.origin[a])?;
+    }
+    Some(Placement::Exact { factor, shift })
 }
 
 /// Bits of the smallest power-of-two cube from `low` that holds `high`.

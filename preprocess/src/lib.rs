@@ -25,9 +25,11 @@ mod sort;
 pub mod sim;
 mod store;
 mod tree;
+mod verify;
 
 pub use build::{
     BuildConfig, BuildReport, ColumnBytes, Dropped, Method, PhaseSeconds, Progress, build,
 };
 pub use error::{Error, Result};
 pub use file::FileSource;
+pub use verify::{Comparison, VerifyConfig, VerifyReport, verify};

@@ -82,8 +82,7 @@ impl Plan {
         // Side bits of a cell of this table.
         let cell_bits = u32::from(self.side_bits - table.key.level() - table.bits);
         let mask = (1u32 << table.bits) - 1;
-        let [x, y, z] =
-            q.map(|c| (u64::from(c).checked_shr(cell_bits).unwrap_or(0) as u32) & mask);
+        let [x, y, z] = q.map(|c| (u64::from(c).checked_shr(cell_bits).unwrap_or(0) as u32) & mask);
         ((z << (2 * table.bits)) | (y << table.bits) | x) as usize
     }
 
@@ -135,12 +134,7 @@ impl Plan {
     }
 
     /// Turns a table's counts into chunks: the largest cubes that fit.
-    fn settle(
-        &mut self,
-        index: usize,
-        capacity: u64,
-        finer: &mut Vec<(usize, usize, NodeKey)>,
-    ) {
+    fn settle(&mut self, index: usize, capacity: u64, finer: &mut Vec<(usize, usize, NodeKey)>) {
         let (key, bits) = (self.tables[index].key, self.tables[index].bits);
         // sums[d]: points per cube d levels below the table's cube, Morton order.
         let mut sums: Vec<Vec<u64>> = vec![Vec::new(); usize::from(bits) + 1];
@@ -149,8 +143,7 @@ impl Plan {
             ((z << (2 * bits)) | (y << bits) | x) as usize
         };
         let cells = &self.tables[index].cells;
-        sums[usize::from(bits)] =
-            (0..cells.len()).map(|m| u64::from(cells[cell_of(m)])).collect();
+        sums[usize::from(bits)] = (0..cells.len()).map(|m| u64::from(cells[cell_of(m)])).collect();
         for d in (0..usize::from(bits)).rev() {
             sums[d] = sums[d + 1].chunks_exact(8).map(|c| c.iter().sum()).collect();
         }
@@ -231,8 +224,8 @@ impl Plan {
                 if cubes[j].0[0] > cubes[i].1[0] {
                     break;
                 }
-                let touch =
-                    (0..3).all(|a| cubes[i].0[a] <= cubes[j].1[a] && cubes[j].0[a] <= cubes[i].1[a]);
+                let touch = (0..3)
+                    .all(|a| cubes[i].0[a] <= cubes[j].1[a] && cubes[j].0[a] <= cubes[i].1[a]);
                 if touch {
                     neighbours[i].push(j);
                     neighbours[j].push(i);

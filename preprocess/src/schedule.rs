@@ -16,7 +16,9 @@ pub fn dependencies(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
     neighbours
         .iter()
         .enumerate()
-        .map(|(i, touching)| touching.iter().copied().filter(|&j| colours[j] < colours[i]).collect())
+        .map(|(i, touching)| {
+            touching.iter().copied().filter(|&j| colours[j] < colours[i]).collect()
+        })
         .collect()
 }
 

@@ -147,7 +147,8 @@ impl RowMap {
         if union.row_bytes == 0 || *from_bytes == 0 {
             return out;
         }
-        for (from, to) in rows.chunks_exact(*from_bytes).zip(out.chunks_exact_mut(union.row_bytes)) {
+        for (from, to) in rows.chunks_exact(*from_bytes).zip(out.chunks_exact_mut(union.row_bytes))
+        {
             for step in moves {
                 let from = &from[step.from..step.from + step.from_scalar.size_bytes()];
                 let to = &mut to[step.to..step.to + step.to_scalar.size_bytes()];

@@ -192,10 +192,8 @@ impl RawStore {
         match self {
             Self::Memory(blocks) => {
                 use rayon::prelude::*;
-                let (blocks, rounding): (Vec<Block>, Vec<f64>) = blocks
-                    .into_par_iter()
-                    .map(|raw| place(raw, &placements, &lattice))
-                    .unzip();
+                let (blocks, rounding): (Vec<Block>, Vec<f64>) =
+                    blocks.into_par_iter().map(|raw| place(raw, &placements, &lattice)).unzip();
                 let rounding = rounding.into_iter().fold(0.0, f64::max);
                 Store::Memory { blocks: coalesce(blocks), rounding }
             }

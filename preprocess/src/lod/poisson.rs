@@ -96,7 +96,9 @@ impl Sampled {
     ) -> Box<dyn Iterator<Item = u32> + 'a> {
         let here = &tree.levels[depth][node];
         if here.is_leaf() {
-            return Box::new((here.start..here.end).filter(|&p| self.level_of[p as usize] == u8::MAX));
+            return Box::new(
+                (here.start..here.end).filter(|&p| self.level_of[p as usize] == u8::MAX),
+            );
         }
         let level = here.key.level();
         let range = self.starts[depth][node] as usize..self.starts[depth][node + 1] as usize;

@@ -5,6 +5,14 @@
 //! that nothing is rounded before the lattice is known. Adding a format means adding a file and a
 //! line in [`open`].
 
+mod ahead;
+mod gather;
+pub mod las;
+mod names;
+pub mod ply;
+pub mod sim;
+mod slot;
+pub mod text;
 
 use lodestream_protocol::ScalarType;
 
