@@ -1,0 +1,128 @@
+//! Writes the first inputs of every target: `cargo run --example seeds -- DATASET.lods fuzz/seeds`.
+//!
+//! From the dataset: its boot block, its pages, the payloads of a few nodes. From nowhere: columns
+//! of every scalar type, which no single dataset holds.
+
+use std::{error::Error, fs, path::Path};
+
+use lodestream_fuzz::{BootInput, ColumnsInput, HierarchyInput, manifest};
+use lodestream_protocol::{
+    Attribute, Dataset, Domain, HEADER_BYTES, LatticeBox, Node, NodeKey, Primitive, ReadAt,
+    ScalarType, Storage, decode_unchecked, encode_column, encode_positions, morton_encode,
+};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [dataset, out] = &arguments[..] else { return Err("usage: seeds DATASET OUT".into()) };
+    let dataset = Dataset::open(fs::read(dataset)?)?;
+    let out = Path::new(out);
+    for target in ["boot", "hierarchy", "columns"] {
+        fs::create_dir_all(out.join(target))?;
+    }
+
+    let header = dataset.boot().header;
+    let json = dataset.source().read_at(HEADER_BYTES as u64, header.manifest_bytes as usize)?;
+    let page_at = (HEADER_BYTES + json.len()) as u64;
+    let root = dataset.source().read_at(page_at, header.root_page_bytes as usize)?;
+    let bytes = BootInput { manifest: &json, page: &root }.to_bytes();
+    fs::write(out.join("boot/dataset"), bytes.ok_or("the manifest is too large for a seed")?)?;
+
+    let manifest = dataset.manifest();
+    let nodes = dataset.hierarchy()?;
+    let groups = u8::try_from(manifest.groups.len())?;
+    let child = match nodes.iter().find_map(|node| node.child_page) {
+        Some(page) => dataset.source().read_at(page.offset, page.bytes as usize)?,
+        None => Vec::new(),
+    };
+    let input = HierarchyInput { groups, levels: manifest.levels, root: &root, child: &child };
+    fs::write(out.join("hierarchy/dataset"), input.to_bytes().ok_or("too large for a seed")?)?;
+
+    // The smallest nodes, one a level: small inputs are mutated best.
+    for level in 0..manifest.levels {
+        let of_level = nodes.iter().filter(|node| node.key.level() == level);
+        let Some(node) = of_level.min_by_key(|node| node.points) else { continue };
+        let payload = &node.payloads[0];
+        let payload = dataset.source().read_at(payload.offset, payload.bytes as usize)?;
+        let (manifest, node) = (manifest.clone(), node.clone());
+        let input = ColumnsInput { manifest, node, payload: &payload };
+        write_columns(&out.join(format!("columns/dataset_level_{level}")), &input)?;
+    }
+
+    let scalars = [
+        ("u8", ScalarType::U8),
+        ("i8", ScalarType::I8),
+        ("u16", ScalarType::U16),
+        ("i16", ScalarType::I16),
+        ("u32", ScalarType::U32),
+        ("i32", ScalarType::I32),
+        ("u64", ScalarType::U64),
+        ("i64", ScalarType::I64),
+        ("f32", ScalarType::F32),
+        ("f64", ScalarType::F64),
+    ];
+    for (name, scalar) in scalars {
+        for components in [1, 3] {
+            let attributes = vec![attribute("a0", scalar, components, Domain::Element)];
+            let path = out.join(format!("columns/{name}x{components}"));
+            write_made(&path, attributes, Primitive::Point, 21)?;
+        }
+    }
+    let textured = vec![
+        attribute("texture_size", ScalarType::U8, 2, Domain::Element),
+        attribute("a1", ScalarType::U8, 4, Domain::Texel),
+    ];
+    write_made(&out.join("columns/texture"), textured, Primitive::Rectangle, 32)
+}
+
+fn attribute(name: &str, scalar: ScalarType, components: u8, domain: Domain) -> Attribute {
+    let storage = Storage::Column { group: 0 };
+    let (name, min, max) = (name.to_owned(), Vec::new(), Vec::new());
+    Attribute { name, scalar, components, domain, storage, min, max }
+}
+
+/// Writes a root node of 300 elements; textures have 2 x 3 texels each.
+fn write_made(
+    path: &Path,
+    attributes: Vec<Attribute>,
+    primitive: Primitive,
+    side_bits: u8,
+) -> Result<(), Box<dyn Error>> {
+    const ELEMENTS: u32 = 300;
+    let mut payload = Vec::new();
+    let mut codes: Vec<u64> = (0..ELEMENTS).map(|i| morton_encode([i * 7, i * i, i / 3])).collect();
+    codes.sort_unstable();
+    encode_positions(&mut payload, &codes, side_bits)?;
+    for attribute in &attributes {
+        let values = match attribute.domain {
+            Domain::Element => ELEMENTS as usize,
+            Domain::Texel => ELEMENTS as usize * 6,
+        };
+        let bytes: Vec<u8> = match attribute.name.as_str() {
+            "texture_size" => [2, 3].repeat(values),
+            _ => (0..values * attribute.value_bytes()).map(|i| (i * i / 5) as u8).collect(),
+        };
+        encode_column(&mut payload, attribute, &bytes)?;
+    }
+    let mut manifest = manifest(side_bits, 1, 1, attributes);
+    manifest.primitive = primitive;
+    let node = Node {
+        key: NodeKey::ROOT,
+        child_mask: 0,
+        points: ELEMENTS,
+        bounds: LatticeBox { min: [0; 3], max: [0; 3] },
+        geometric_error: 0.0,
+        spacing: 0.0,
+        normal_cone: None,
+        payloads: Vec::new(),
+        child_page: None,
+    };
+    write_columns(path, &ColumnsInput { manifest, node, payload: &payload })
+}
+
+/// Writes a seed, once it is clear that the target reads it as what it was meant to be.
+fn write_columns(path: &Path, input: &ColumnsInput<'_>) -> Result<(), Box<dyn Error>> {
+    let bytes = input.to_bytes().ok_or("more columns than an input of `columns` can name")?;
+    let back = ColumnsInput::parse(&bytes).ok_or("the seed describes no manifest")?;
+    decode_unchecked(&back.manifest, 0, &back.node, back.payload)?;
+    Ok(fs::write(path, bytes)?)
+}

@@ -1,0 +1,25 @@
+//! A node's columns: positions and attributes of every type, in every encoding.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use lodestream_fuzz::ColumnsInput;
+use lodestream_protocol::{Domain, decode_unchecked, encode_column};
+
+fuzz_target!(|data: &[u8]| {
+    let Some(ColumnsInput { manifest, node, payload }) = ColumnsInput::parse(data) else { return };
+    let Ok(decoded) = decode_unchecked(&manifest, 0, &node, payload) else { return };
+    let count = node.points as usize;
+    assert_eq!(decoded.positions.len(), count);
+    let bits = manifest.lattice.node_bits(node.key.level());
+    let inside = |q: &[u32; 3]| q.iter().all(|&v| u64::from(v) >> bits == 0);
+    assert!(decoded.positions.iter().all(inside), "a position outside its node");
+    for column in &decoded.columns {
+        let attribute = &manifest.attributes[column.attribute];
+        assert_eq!(column.bytes.len() % attribute.value_bytes(), 0);
+        if attribute.domain == Domain::Element {
+            assert_eq!(column.bytes.len() / attribute.value_bytes(), count);
+            // What was decoded can be stored.
+            encode_column(&mut Vec::new(), attribute, &column.bytes).expect("a decoded column");
+        }
+    }
+});

@@ -1,0 +1,125 @@
+//! Input of the target `columns`.
+
+use lodestream_protocol::{
+    Attribute, Domain, LatticeBox, Manifest, Node, NodeKey, Primitive, ScalarType, Storage,
+};
+
+use crate::manifest;
+
+const SCALARS: [ScalarType; 10] = [
+    ScalarType::U8,
+    ScalarType::I8,
+    ScalarType::U16,
+    ScalarType::I16,
+    ScalarType::U32,
+    ScalarType::I32,
+    ScalarType::U64,
+    ScalarType::I64,
+    ScalarType::F32,
+    ScalarType::F64,
+];
+const TEXEL: u8 = 1 << 7;
+const TEXTURE_SIZE: u8 = 1 << 6;
+const SCALAR_MASK: u8 = 0b1111;
+/// More elements only make a run slower: no decoder behaves differently beyond.
+const MAX_POINTS: u32 = 1 << 18;
+
+/// A node's payload of group 0 and all that a reader knows about it beforehand.
+///
+/// Bytes: lattice bits, level, elements (u24), attributes; for each of those a byte with its scalar
+/// type, whether it holds texture sizes and whether it belongs to texels, and a byte with its
+/// components; the payload.
+#[derive(Debug)]
+pub struct ColumnsInput<'a> {
+    /// What the payload is read with.
+    pub manifest: Manifest,
+    /// Whose payload it is.
+    pub node: Node,
+    /// The payload.
+    pub payload: &'a [u8],
+}
+
+impl<'a> ColumnsInput<'a> {
+    /// Takes the fuzzer's bytes apart; `None` where they describe no valid manifest.
+    #[must_use]
+    pub fn parse(data: &'a [u8]) -> Option<Self> {
+        let (&[side_bits, level, p0, p1, p2, count], mut payload) = data.split_first_chunk()?;
+        let side_bits = side_bits % 33;
+        let level = level % (side_bits + 1);
+        let mut attributes = Vec::new();
+        for index in 0..count % 5 {
+            let (&[kind, components], rest) = payload.split_first_chunk()?;
+            payload = rest;
+            attributes.push(Attribute {
+                name: match kind & TEXTURE_SIZE {
+                    0 => format!("a{index}"),
+                    _ => "texture_size".into(),
+                },
+                scalar: SCALARS[usize::from(kind & SCALAR_MASK) % SCALARS.len()],
+                components,
+                domain: if kind & TEXEL == 0 { Domain::Element } else { Domain::Texel },
+                storage: Storage::Column { group: 0 },
+                min: Vec::new(),
+                max: Vec::new(),
+            });
+        }
+        let textured = attributes.iter().any(|a| a.domain == Domain::Texel);
+        if textured {
+            attributes.extend(
+                Primitive::Rectangle
+                    .required_attributes()
+                    .iter()
+                    .filter(|(name, _)| *name != "texture_size")
+                    .map(|&(name, components)| constant(name, components)),
+            );
+        }
+        let mut manifest = manifest(side_bits, side_bits + 1, 1, attributes);
+        if textured {
+            manifest.primitive = Primitive::Rectangle;
+        }
+        manifest.to_json().ok()?;
+        let node = Node {
+            key: NodeKey::new(level, [0; 3])?,
+            child_mask: 0,
+            points: u32::from_le_bytes([p0, p1, p2, 0]) % MAX_POINTS,
+            bounds: LatticeBox { min: [0; 3], max: [0; 3] },
+            geometric_error: 0.0,
+            spacing: 0.0,
+            normal_cone: None,
+            payloads: Vec::new(),
+            child_page: None,
+        };
+        Some(Self { manifest, node, payload })
+    }
+
+    /// Undoes [`parse`](Self::parse), for a node of up to four stored attributes.
+    #[must_use]
+    pub fn to_bytes(&self) -> Option<Vec<u8>> {
+        let [p0, p1, p2, _] = self.node.points.to_le_bytes();
+        let stored: Vec<_> = self.manifest.columns_of(0).collect();
+        let count = u8::try_from(stored.len()).ok().filter(|count| *count < 5)?;
+        let mut bytes =
+            vec![self.manifest.lattice.side_bits, self.node.key.level(), p0, p1, p2, count];
+        for attribute in stored {
+            let scalar = SCALARS.iter().position(|s| *s == attribute.scalar)?;
+            let size = if attribute.name == "texture_size" { TEXTURE_SIZE } else { 0 };
+            let texel = if attribute.domain == Domain::Texel { TEXEL } else { 0 };
+            bytes.push(u8::try_from(scalar).ok()? | size | texel);
+            bytes.push(attribute.components);
+        }
+        bytes.extend_from_slice(self.payload);
+        Some(bytes)
+    }
+}
+
+fn constant(name: &str, components: u8) -> Attribute {
+    Attribute {
+        name: name.into(),
+        scalar: ScalarType::U8,
+        components,
+        domain: Domain::Element,
+        storage: Attribute::constant_storage(&vec![0; usize::from(components)]),
+        min: Vec::new(),
+        max: Vec::new(),
+    }
+}
