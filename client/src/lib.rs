@@ -1,4 +1,5 @@
 //! lodestream: client.
 
 pub mod camera;
+pub mod render;
 pub mod source;

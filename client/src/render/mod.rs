@@ -1,0 +1,97 @@
+//! Drawing: from decoded nodes to pictures.
+//!
+//! The way through: a [`Scene`] (nodes of clouds) and [`RenderSettings`] go into one of the
+//! renderers and a [`Frame`] comes out. `view` (from lattice to pixels), `color` (from attributes to
+//! colours) and the rules of [`Splat`] (which pixels are covered) are shared; the [`GpuRenderer`]
+//! follows them in f32 and WGSL, the [`CpuRenderer`] in f64. Both draw the same splats, so that one
+//! is the other's test and its stand-in. [`TruthRenderer`] is the CPU renderer for all points of a
+//! dataset, supersampled; [`ssim`] says how far two pictures are apart.
+
+mod color;
+mod cpu;
+mod gpu;
+mod picture;
+mod ramp;
+mod scene;
+mod settings;
+mod ssim;
+mod view;
+
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+pub use color::Coloring;
+pub use cpu::{CpuRenderer, TruthRenderer};
+pub use gpu::GpuRenderer;
+pub use picture::Picture;
+pub use scene::{DrawNode, Scene};
+pub use settings::{
+    ColorMode, LARGEST_SIDE_PX, LARGEST_SPLAT_PX, RenderSettings, SMALLEST_SPLAT_PX, Splat,
+    SplatSize,
+};
+pub use ssim::ssim;
+
+/// Why there is no picture. Variants follow what a caller does next.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The settings ask for the impossible: mend them.
+    #[error("{0}")]
+    Settings(String),
+    /// The scene contradicts itself: a mistake in the program.
+    #[error("{0}")]
+    Scene(String),
+    /// There is no usable GPU: draw on the CPU.
+    #[error("no usable GPU: {0}")]
+    NoGpu(String),
+    /// The GPU failed while drawing: draw on the CPU, or with fewer points.
+    #[error("the GPU failed: {0}")]
+    Gpu(String),
+    /// Pictures of different or too small sizes cannot be compared.
+    #[error("pictures of {0} and {1} pixels cannot be compared")]
+    Compare(String, String),
+    /// The picture could not be written.
+    #[error("{path}: cannot write the picture: {why}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        why: String,
+    },
+}
+
+/// What drawing a frame took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct FrameStatistics {
+    /// Nodes drawn.
+    pub nodes: u64,
+    /// Points in them.
+    pub points: u64,
+    /// Draw calls (GPU only).
+    pub draw_calls: u64,
+    /// Bytes of nodes sent to the GPU for this frame.
+    pub uploaded_bytes: u64,
+    /// Bytes of nodes on the GPU after this frame.
+    pub resident_bytes: u64,
+}
+
+impl FrameStatistics {
+    fn of(nodes: &[&DrawNode]) -> Self {
+        let points = nodes.iter().map(|node| node.points.positions.len() as u64).sum();
+        Self { nodes: nodes.len() as u64, points, ..Self::default() }
+    }
+}
+
+/// A picture, and what it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// What is seen.
+    pub picture: Picture,
+    /// What it took.
+    pub statistics: FrameStatistics,
+}

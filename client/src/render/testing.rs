@@ -1,0 +1,165 @@
+//! Synthetic clouds for the tests of this module.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use lodestream_protocol::{
+    Attribute, Column, GroupInfo, Lattice, LatticeBox, Manifest, Method, NodeKey, NodePoints,
+    Primitive, Refinement, ScalarType, Storage,
+};
+
+use crate::render::{DrawNode, Scene};
+
+/// A manifest without points and attributes.
+pub fn manifest() -> Manifest {
+    Manifest {
+        generator: "test".into(),
+        points: 0,
+        nodes: 0,
+        levels: 0,
+        refinement: Refinement::Additive,
+        primitive: Primitive::Point,
+        method: Method { name: "test".into(), grid: 128, leaf_capacity: 1000 },
+        lattice: Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits: 16 },
+        bounds: LatticeBox::EMPTY,
+        largest_rounding: 0.0,
+        attributes: Vec::new(),
+        groups: vec![GroupInfo { name: "base".into(), bytes: 0 }],
+        crs: None,
+        sources: Vec::new(),
+    }
+}
+
+/// A point of a synthetic cloud.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    /// Lattice units relative to the root cube.
+    pub q: [u32; 3],
+    /// Red, green, blue.
+    pub rgb: [u8; 3],
+    /// Strength of the return.
+    pub intensity: u16,
+}
+
+/// Clouds and their nodes.
+#[derive(Debug, Clone)]
+pub struct TestScene {
+    pub clouds: Vec<Arc<Manifest>>,
+    pub nodes: Vec<DrawNode>,
+}
+
+impl TestScene {
+    pub fn scene(&self) -> Scene<'_> {
+        Scene { clouds: &self.clouds, nodes: &self.nodes }
+    }
+
+    /// The scene with another cloud in it.
+    pub fn and(mut self, other: Self) -> Self {
+        let first = self.clouds.len();
+        self.clouds.extend(other.clouds);
+        let nodes = other.nodes.into_iter();
+        self.nodes.extend(nodes.map(|node| DrawNode { cloud: node.cloud + first, ..node }));
+        self
+    }
+}
+
+/// A small generator of reproducible numbers (SplitMix64).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// 0 to 1.
+    pub fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// A cloud of the points on the lattice, spread over `levels` levels of nodes.
+pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
+    let mut by_node: BTreeMap<NodeKey, Vec<Point>> = BTreeMap::new();
+    let mut bounds = LatticeBox::EMPTY;
+    for (index, point) in points.iter().enumerate() {
+        let level = (index % usize::from(levels)) as u8;
+        let coords =
+            point.q.map(|c| c.checked_shr(u32::from(lattice.node_bits(level))).unwrap_or(0));
+        let key = NodeKey::new(level, coords).expect("a point of the root cube");
+        bounds.grow(point.q);
+        by_node.entry(key).or_default().push(*point);
+    }
+    let attribute = |name: &str, scalar, components: u8, group, max| Attribute {
+        name: name.into(),
+        scalar,
+        components,
+        domain: Default::default(),
+        storage: Storage::Column { group },
+        min: vec![0.0; usize::from(components)],
+        max: vec![max; usize::from(components)],
+    };
+    let group = |name: &str| GroupInfo { name: name.into(), bytes: 0 };
+    let manifest = Manifest {
+        points: points.len() as u64,
+        nodes: by_node.len() as u64,
+        levels,
+        lattice,
+        bounds,
+        attributes: vec![
+            attribute("color", ScalarType::U16, 3, 0, 65_535.0),
+            attribute("intensity", ScalarType::U16, 1, 1, 1000.0),
+        ],
+        groups: vec![group("base"), group("intensity")],
+        ..manifest()
+    };
+    let nodes = by_node.into_iter().map(|(key, points)| {
+        let corner = lattice.node_min(key);
+        let relative = |p: &Point| std::array::from_fn(|a| p.q[a] - corner[a]);
+        // 16-bit colours, as scanners that scale them up write them.
+        let colors =
+            points.iter().flat_map(|p| p.rgb).flat_map(|c| (u16::from(c) << 8).to_le_bytes());
+        let intensities = points.iter().flat_map(|p| p.intensity.to_le_bytes());
+        let node = NodePoints {
+            key,
+            positions: points.iter().map(relative).collect(),
+            columns: vec![
+                Column { attribute: 0, bytes: colors.collect() },
+                Column { attribute: 1, bytes: intensities.collect() },
+            ],
+        };
+        DrawNode { cloud: 0, points: Arc::new(node) }
+    });
+    TestScene { nodes: nodes.collect(), clouds: vec![Arc::new(manifest)] }
+}
+
+/// A room-sized scene in a cube of 2^`side_bits` lattice units: rolling ground, a ball, a wall.
+pub fn landscape(side_bits: u8, count: usize) -> Vec<Point> {
+    let mut random = Random(7);
+    let side = f64::from(side_bits).exp2();
+    let mut points = Vec::with_capacity(count);
+    for index in 0..count {
+        let (u, v) = (random.unit(), random.unit());
+        let (place, rgb) = match index % 4 {
+            0 => {
+                let angle = u * std::f64::consts::TAU;
+                let z = 2.0 * v - 1.0;
+                let r = (1.0 - z * z).sqrt();
+                let ball =
+                    [0.3 + 0.15 * r * angle.cos(), 0.4 + 0.15 * r * angle.sin(), 0.4 + 0.15 * z];
+                (ball, [200, (v * 255.0) as u8, 40])
+            }
+            1 => ([0.1 + 0.8 * u, 0.85, 0.1 + 0.5 * v], [60, 90, (u * 255.0) as u8]),
+            _ => {
+                let height = 0.1 + 0.05 * (9.0 * u).sin() * (7.0 * v).cos();
+                ([u, v, height], [(u * 255.0) as u8, 160, (v * 255.0) as u8])
+            }
+        };
+        let q = place.map(|c| (c * (side - 1.0)) as u32);
+        let intensity = (1000.0 * (0.5 + 0.5 * (20.0 * u).sin() * (20.0 * v).sin())) as u16;
+        points.push(Point { q, rgb, intensity });
+    }
+    points
+}
