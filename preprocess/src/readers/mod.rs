@@ -6,6 +6,7 @@
 //! line in [`open`].
 
 mod ahead;
+mod color;
 mod gather;
 pub mod las;
 mod names;

@@ -83,14 +83,12 @@ pub(super) fn blocks(
     // A vertex of text is rarely shorter than 24 bytes.
     let mut gather = Gather::new(layout.row_bytes(), chunk.bytes.len() / 24 + 1);
     let mut tally = Tally::default();
-    let mut number = chunk.first_line;
-    for line in lines(&chunk.bytes, terminator) {
+    for (line, number) in lines(&chunk.bytes, terminator).zip(chunk.first_line..) {
         if !is_blank(line) {
             let position = vertex(layout, line, gather.row(), &mut tally)
                 .map_err(|why| format!("line {number}: {why}"))?;
             gather.keep(position);
         }
-        number += 1;
     }
     gather.tally.add(tally);
     Ok(gather.finish())
@@ -106,9 +104,8 @@ fn vertex(
     let mut fields = Fields { rest: line };
     let mut position = [0.0; 3];
     for (index, &(kind, field)) in layout.fields.iter().enumerate() {
-        let missing = || {
-            format!("{index} values, where the header announces {}", layout.fields.len())
-        };
+        let missing =
+            || format!("{index} values, where the header announces {}", layout.fields.len());
         let scalar = match kind {
             PropertyKind::Scalar(scalar) => scalar,
             PropertyKind::List { .. } => {
@@ -153,7 +150,10 @@ fn vertex(
         }
     }
     if fields.word().is_some() {
-        return Err(format!("more values than the {} that the header announces", layout.fields.len()));
+        return Err(format!(
+            "more values than the {} that the header announces",
+            layout.fields.len()
+        ));
     }
     Ok(position)
 }

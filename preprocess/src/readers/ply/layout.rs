@@ -115,8 +115,7 @@ impl Layout {
     /// `None` where the colour is not in floating point.
     pub fn float_color_only(&self) -> Option<Self> {
         let mut attributes = Vec::new();
-        let slots =
-            add_attribute(&mut attributes, "color", ScalarType::F64, 3, Rule::Exact);
+        let slots = add_attribute(&mut attributes, "color", ScalarType::F64, 3, Rule::Exact);
         let mut found = 0;
         let mut fields = self.fields.clone();
         for (kind, field) in &mut fields {
@@ -240,18 +239,23 @@ mod tests {
 
     #[test]
     fn triples_of_unfit_types_are_kept_apart() {
-        let properties =
-            ["float x", "float y", "float z", "uchar r", "uchar g", "float b", "int nx", "int ny",
-             "int nz"];
+        let properties = [
+            "float x", "float y", "float z", "uchar r", "uchar g", "float b", "int nx", "int ny",
+            "int nz",
+        ];
         let kept = layout(&properties).expect("points");
-        assert_eq!(described(&kept), ["r U8x1", "g U8x1", "b F32x1", "nx I32x1", "ny I32x1", "nz I32x1"]);
+        assert_eq!(
+            described(&kept),
+            ["r U8x1", "g U8x1", "b F32x1", "nx I32x1", "ny I32x1", "nz I32x1"]
+        );
         assert_eq!(kept.left_out.len(), 2);
     }
 
     #[test]
     fn coordinates_tell_their_precision() {
         let kind = |properties: &[&str]| layout(properties).expect("points").coordinates;
-        let float = |decimals, single_precision| CoordinateKind::Float { decimals, single_precision };
+        let float =
+            |decimals, single_precision| CoordinateKind::Float { decimals, single_precision };
         assert_eq!(kind(&XYZ), float(None, true));
         assert_eq!(kind(&["double x", "float y", "float z"]), float(None, false));
         assert_eq!(kind(&["int x", "short y", "uchar z"]), float(Some(0), false));

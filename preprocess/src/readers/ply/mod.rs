@@ -22,6 +22,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use lodestream_protocol::ScalarType;
 use rayon::prelude::*;
 
 use self::{
@@ -33,6 +34,7 @@ use self::{
 use super::{
     BLOCK_POINTS, Block, InputInfo, PointReader, ReadReport,
     ahead::{batch_parts, run_ahead},
+    color::ColorRange,
     gather::Tally,
     text::lines::{ChunkError, terminator_of},
 };
@@ -58,9 +60,6 @@ struct PlyReader {
     info: InputInfo,
 }
 
-/// Floating-point colours run from 0 to 1, stored as 0 to 65535.
-const UNIT_COLORS: f64 = 65535.0;
-
 /// Blocks and counts of one part of the file.
 type Part = (Vec<Block>, Tally);
 
@@ -84,7 +83,7 @@ impl PlyReader {
             wrong(format!("the file has no vertices (its elements: {listed})"))
         })?;
         check_size(&header, vertex, size).map_err(wrong)?;
-        let layout = Layout::new(element, UNIT_COLORS).map_err(wrong)?;
+        let layout = Layout::new(element, ColorRange::Unit.scale()).map_err(wrong)?;
         let info = InputInfo {
             path: name.clone(),
             points: Some(element.count),
@@ -107,24 +106,20 @@ impl PlyReader {
     /// tells.
     fn settle_float_colors(&mut self) -> Result<()> {
         let Some(layout) = self.layout.float_color_only() else { return Ok(()) };
-        let mut most = 0.0_f64;
+        let mut components = Vec::new();
         let sample = self.element().count.min(BLOCK_POINTS as u64);
         // Broken vertices are reported when they are read.
         let _ = self.stream(&layout, sample, &mut |block| {
-            for component in block.attributes.chunks_exact(8) {
-                most = most.max(layout.attributes[0].scalar.to_f64(component));
-            }
+            let values = block.attributes.chunks_exact(8).map(|v| ScalarType::F64.to_f64(v));
+            components.extend(values);
             Ok(())
         });
-        if most <= 1.0 {
-            return Ok(());
+        let range = ColorRange::of(components.into_iter());
+        if range != ColorRange::Unit {
+            self.layout = Layout::new(self.element(), range.scale())
+                .map_err(|why| Error::input(self.info.path.clone(), why))?;
+            self.info.left_out.push(range.note());
         }
-        let (scale, range) = if most <= 255.0 { (UNIT_COLORS / 255.0, 255) } else { (1.0, 65535) };
-        self.layout = Layout::new(self.element(), scale)
-            .map_err(|why| Error::input(self.info.path.clone(), why))?;
-        self.info.left_out.push(format!(
-            "colour: floating point up to {most}; taken to run from 0 to {range}, not 0 to 1"
-        ));
         Ok(())
     }
 

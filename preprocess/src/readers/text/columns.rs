@@ -4,12 +4,10 @@ use std::fmt::Write;
 
 use lodestream_protocol::ScalarType;
 
-use super::{
-    sample::{ColorRange, Sample},
-    split::Delimiter,
-};
+use super::{sample::Sample, split::Delimiter};
 use crate::readers::{
     InputAttribute,
+    color::ColorRange,
     names::{Role, roles},
     slot::{Rule, Slot, add_attribute},
 };
@@ -108,14 +106,14 @@ pub(super) fn guessed(sample: &Sample, columns: usize, is_pts: bool) -> Option<M
 
     let mut colors: Vec<(ColorRange, [usize; 3])> = triples(&rest)
         .into_iter()
-        .filter_map(|triple| Some((sample.color_range(triple)?, triple)))
+        .filter_map(|triple| Some((sample.color_candidate(triple)?, triple)))
         .collect();
     if is_pts && colors.len() > 1 {
         // x y z intensity red green blue
         colors.rotate_left(1);
     }
-    // A 12-bit intensity beside 8-bit colours would else pass for the first of three 16-bit ones.
-    colors.sort_by_key(|(range, _)| *range == ColorRange::Word);
+    // A 12-bit or fractional intensity beside 8-bit colours would else pass for one of them.
+    colors.sort_by_key(|&(range, _)| range);
     let color = colors.first().copied();
     if let Some((_, triple)) = color {
         for (part, column) in triple.into_iter().enumerate() {
@@ -177,8 +175,11 @@ impl Plan {
         };
         let mut color = Vec::new();
         if let Some(columns) = find(Role::Color) {
-            let scale = color_scale(sample, columns, notes);
-            let rule = Rule::Color { scale };
+            let range = sample.color_range(columns);
+            if range.scale() != 1.0 {
+                notes.push(range.note());
+            }
+            let rule = Rule::Color { scale: range.scale() };
             color = add_attribute(&mut attributes, "color", ScalarType::U16, 3, rule);
         }
         let mut normal = Vec::new();
@@ -199,18 +200,6 @@ impl Plan {
         }
         Self { delimiter, columns, more_columns: false, count_lines: false, attributes }
     }
-}
-
-/// Steps of a 16-bit colour per unit of the text's.
-fn color_scale(sample: &Sample, columns: [usize; 3], notes: &mut Vec<String>) -> f64 {
-    let (scale, range) = match sample.color_range(columns) {
-        Some(ColorRange::Unit) => (65535.0, "0 to 1"),
-        // Whole numbers stay as they are; 117.5 of 255 does not.
-        Some(ColorRange::Byte) if !sample.is_whole(columns) => (257.0, "0 to 255, with fractions"),
-        _ => return 1.0,
-    };
-    notes.push(format!("colour: numbers run from {range}; stored as 0 to 65535"));
-    scale
 }
 
 #[cfg(test)]
@@ -299,8 +288,7 @@ mod tests {
             let mut notes = Vec::new();
             let plan = Plan::new(Delimiter::Blanks, &meanings, &sample, &mut notes);
             assert_eq!(plan.attributes[0].scalar, ScalarType::U16);
-            let expected =
-                Slot { offset: 0, scalar: ScalarType::U16, rule: Rule::Color { scale } };
+            let expected = Slot { offset: 0, scalar: ScalarType::U16, rule: Rule::Color { scale } };
             assert_eq!(plan.columns[3], Column::Value(expected), "{line}");
             assert_eq!(notes.len(), noted, "{line}");
         }

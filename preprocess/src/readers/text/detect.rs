@@ -176,11 +176,10 @@ impl Beginning {
     ) -> Result<(Plan, Vec<String>), String> {
         let mut notes = Vec::new();
         let meanings = match columns {
-            Some(list) => self.named(list)?,
-            None => self.from_header(sample, &mut notes).map_or_else(
-                || self.guessed(sample, is_pts, &mut notes),
-                Ok,
-            )?,
+            Some(list) => self.by_option(list)?,
+            None => self
+                .by_header(sample, &mut notes)
+                .map_or_else(|| self.by_guess(sample, is_pts, &mut notes), Ok)?,
         };
         let mut plan = Plan::new(self.delimiter, &meanings, sample, &mut notes);
         plan.more_columns = columns.is_some();
@@ -188,7 +187,7 @@ impl Beginning {
         Ok((plan, notes))
     }
 
-    fn named(&self, list: &str) -> Result<Meanings, String> {
+    fn by_option(&self, list: &str) -> Result<Meanings, String> {
         let meanings = named(list)?;
         if meanings.len() > self.columns {
             return Err(format!(
@@ -201,7 +200,7 @@ impl Beginning {
         Ok(meanings)
     }
 
-    fn from_header(&self, sample: &Sample, notes: &mut Vec<String>) -> Option<Meanings> {
+    fn by_header(&self, sample: &Sample, notes: &mut Vec<String>) -> Option<Meanings> {
         for (number, line) in self.before.iter().rev() {
             let fields = self.delimiter.fields(line.as_bytes());
             let names: Vec<String> =
@@ -212,7 +211,8 @@ impl Beginning {
             if let Some(meanings) = from_header(&names, sample) {
                 let skipped = names.iter().zip(&meanings).filter(|(_, meaning)| meaning.is_none());
                 notes.extend(
-                    skipped.map(|(name, _)| format!("column {name:?}: no numbers were found in it")),
+                    skipped
+                        .map(|(name, _)| format!("column {name:?}: no numbers were found in it")),
                 );
                 return Some(meanings);
             }
@@ -224,7 +224,7 @@ impl Beginning {
         None
     }
 
-    fn guessed(
+    fn by_guess(
         &self,
         sample: &Sample,
         is_pts: bool,
@@ -345,6 +345,5 @@ mod tests {
             assert!(why.contains(reason), "{text:?}: {why}");
         }
         assert!(check_text(&[0xff, 0xfe, b'1', 0]).expect_err("refused").contains("UTF-16"));
-
     }
 }

@@ -61,7 +61,8 @@ pub(in crate::readers) fn scan(bytes: &[u8]) -> Option<(Number, usize)> {
     let fits = count <= MANTISSA_DIGITS;
     let value = if fits && mantissa <= 1 << 53 && steps <= EXACT_POWERS {
         let magnitude = mantissa as f64;
-        let magnitude = if power < 0 { magnitude / POWERS[steps] } else { magnitude * POWERS[steps] };
+        let magnitude =
+            if power < 0 { magnitude / POWERS[steps] } else { magnitude * POWERS[steps] };
         if bytes[0] == b'-' { -magnitude } else { magnitude }
     } else {
         std::str::from_utf8(&bytes[..at]).ok()?.parse().ok()?

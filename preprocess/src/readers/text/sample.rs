@@ -1,6 +1,7 @@
 //! A sample of a text file's numbers, to tell what its columns are.
 
 use super::split::{Delimiter, Field, Fields};
+use crate::readers::color::ColorRange;
 
 /// Rows of numbers from several places of a file.
 #[derive(Debug, Default)]
@@ -12,17 +13,6 @@ pub(super) struct Sample {
     numbers: Vec<usize>,
     /// Lines that have another number of fields.
     misfits: usize,
-}
-
-/// How the numbers of a colour are to be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum ColorRange {
-    /// From 0 to 1.
-    Unit,
-    /// From 0 to 255.
-    Byte,
-    /// From 0 to 65535.
-    Word,
 }
 
 /// Rows that are enough to judge by.
@@ -77,25 +67,20 @@ impl Sample {
         self.column(column).all(|v| v == value)
     }
 
-    /// How the columns may be read as a colour, if they may.
-    pub fn color_range(&self, columns: [usize; 3]) -> Option<ColorRange> {
-        let values = || columns.into_iter().flat_map(|column| self.column(column));
-        let most = values().fold(0.0, f64::max);
-        let whole = values().all(|v| v.fract() == 0.0);
-        if !values().all(|v| (0.0..=65535.0).contains(&v)) {
-            None
-        } else if most <= 1.0 {
-            Some(ColorRange::Unit)
-        } else if most <= 255.0 {
-            Some(ColorRange::Byte)
-        } else {
-            whole.then_some(ColorRange::Word)
-        }
+    /// How the columns are to be read, where they hold a colour.
+    pub fn color_range(&self, columns: [usize; 3]) -> ColorRange {
+        ColorRange::of(columns.into_iter().flat_map(|column| self.column(column)))
     }
 
-    /// Whether all the columns' numbers are whole.
-    pub fn is_whole(&self, columns: [usize; 3]) -> bool {
-        columns.into_iter().all(|column| self.column(column).all(|v| v.fract() == 0.0))
+    /// How the columns are to be read, where they may hold a colour: all of them in one range, and
+    /// whole beyond 255.
+    pub fn color_candidate(&self, columns: [usize; 3]) -> Option<ColorRange> {
+        let values = || columns.into_iter().flat_map(|column| self.column(column));
+        let range = self.color_range(columns);
+        let most = if range == ColorRange::Unit { 1.0 } else { 65535.0 };
+        let fits = values().all(|v| (0.0..=most).contains(&v));
+        let whole = range != ColorRange::Word || values().all(|v| v.fract() == 0.0);
+        (fits && whole).then_some(range)
     }
 
     /// Whether the columns hold vectors of length one (or zero: unknown normals), which could not
@@ -113,7 +98,12 @@ impl Sample {
     }
 
     fn column(&self, column: usize) -> impl Iterator<Item = f64> {
-        self.values.iter().skip(column).step_by(self.columns.max(1)).copied().filter(|v| !v.is_nan())
+        self.values
+            .iter()
+            .skip(column)
+            .step_by(self.columns.max(1))
+            .copied()
+            .filter(|v| !v.is_nan())
     }
 }
 
@@ -142,9 +132,10 @@ mod tests {
 
     #[test]
     fn colours_are_told_by_their_range() {
-        let range = |row: &str| sample(&[row]).color_range([0, 1, 2]);
+        let range = |row: &str| sample(&[row]).color_candidate([0, 1, 2]);
         assert_eq!(range("0 0.5 1"), Some(ColorRange::Unit));
         assert_eq!(range("0 0 1"), Some(ColorRange::Unit));
+        assert_eq!(range("0 0.5 1.5"), None);
         assert_eq!(range("0 117.0 255"), Some(ColorRange::Byte));
         assert_eq!(range("0 117 256"), Some(ColorRange::Word));
         assert_eq!(range("0 117.5 256"), None);

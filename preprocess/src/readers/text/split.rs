@@ -193,7 +193,7 @@ mod tests {
     fn tells_the_delimiter() {
         for (line, delimiter) in [
             ("1 2 3", Delimiter::Blanks),
-            (" 1\t 2\t 3 ", Delimiter::Blanks),
+            (" 1\t 2 3 ", Delimiter::Blanks),
             ("1\t\t2\t3", Delimiter::Blanks),
             ("1\t2\t3\r", Delimiter::Byte(b'\t')),
             ("1.5,2,3", Delimiter::Byte(b',')),
