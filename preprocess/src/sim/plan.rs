@@ -185,15 +185,7 @@ impl Sector {
                 samples.extend(scanner.shoot(station, aim, steps, &mut random));
             }
         }
-        let found = samples.len();
-        if found > wanted {
-            let mut i = 0;
-            // Keeps sample i where the count of kept ones, wanted * i / found, grows.
-            samples.retain(|_| {
-                i += 1;
-                i * wanted / found != (i - 1) * wanted / found
-            });
-        }
+        thin(&mut samples, wanted);
         let mut attempt = 0;
         while samples.len() < wanted {
             let mut random = Random::of([self.seed, self.number, attempt, u64::MAX]);
@@ -212,6 +204,17 @@ impl Sector {
         }
         samples
     }
+}
+
+/// Leaves `wanted` of the items, evenly spread, in order; all of them if there are no more.
+fn thin<T>(items: &mut Vec<T>, wanted: usize) {
+    let found = items.len();
+    let mut i = 0;
+    // Keeps item i where the number kept so far, wanted * i / found, grows.
+    items.retain(|_| {
+        i += 1;
+        found <= wanted || i * wanted / found != (i - 1) * wanted / found
+    });
 }
 
 #[cfg(test)]
@@ -267,13 +270,14 @@ mod tests {
     }
 
     #[test]
-    fn a_sector_whose_grid_finds_too_much_keeps_an_even_choice() {
-        let scanner = Scanner::courtyard();
-        let all = Plan::new(3000, 1).sector(0);
-        let fewer = Sector { points: all.points - 30, ..all };
-        let (all, fewer) = (all.scan(&scanner), fewer.scan(&scanner));
-        let mut rest = all.iter();
-        assert!(fewer.iter().all(|sample| rest.any(|other| other == sample)));
+    fn thinning_drops_evenly() {
+        let mut items: Vec<usize> = (0..1000).collect();
+        thin(&mut items, 900);
+        assert_eq!(items.len(), 900);
+        assert!(items.windows(2).all(|w| w[1] - w[0] <= 2));
+        assert!((0..10).all(|i| items.iter().filter(|&&x| x / 100 == i).count() == 90));
+        thin(&mut items, 2000);
+        assert_eq!(items.len(), 900);
     }
 
     impl Sector {
