@@ -34,9 +34,9 @@ impl Scan {
     /// `points` points of `format` with `extra` undescribed bytes each; their bytes are arbitrary
     /// but always the same, except that neighbours are alike, as in a scan.
     pub(crate) fn new(format: u8, points: usize, extra: usize, compression: Compression) -> Self {
-        let (fields, format_bytes) = fields(format).expect("formats 0 to 10");
+        let (_, format_bytes) = fields(format).expect("formats 0 to 10");
         let record_bytes = format_bytes + extra;
-        let mut bytes: Vec<u8> = (0..points)
+        let bytes: Vec<u8> = (0..points)
             .flat_map(|point| {
                 (0..record_bytes).map(move |at| {
                     let seed = (point as u64 / 3) * 131 + at as u64 * 7919;
@@ -44,13 +44,6 @@ impl Scan {
                 })
             })
             .collect();
-        // Arbitrary bits make no times: the encoder subtracts them as integers, with overflow.
-        if let Some(time) = fields.iter().find(|field| field.name == "gps_time") {
-            for (point, record) in bytes.chunks_exact_mut(record_bytes).enumerate() {
-                let seconds = 1e8 + (point as f64) * 0.37;
-                record[time.at..time.at + 8].copy_from_slice(&seconds.to_le_bytes());
-            }
-        }
         let version = Version::new(1, 4);
         let header = raw::Header {
             version,
