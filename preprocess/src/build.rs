@@ -164,12 +164,18 @@ pub struct ColumnBytes {
 /// instead of the 2729 that 1 makes, saves 0.19 bytes a point and a fifth of the time; 4 saves
 /// 0.06 bytes more but makes leaves that are slow to stream.
 const LEAF_CAPACITY_PER_CELL_OF_A_FACE: u32 = 2;
-/// Most points of a chunk built in core.
-const CHUNK_POINTS_MAX: u64 = 1 << 20;
-/// Fewest: below, borders cost more than parallelism gains.
-const CHUNK_POINTS_MIN: u64 = 1 << 17;
-/// Chunks to aim for, so that all threads have work to the end.
-const CHUNKS_WANTED: u64 = 16;
+/// How many points are built in core at once.
+#[derive(Debug, Clone, Copy)]
+struct ChunkSizes {
+    /// Fewest: below, borders cost more than parallelism gains.
+    min: u64,
+    /// Most.
+    max: u64,
+    /// Chunks to aim for, so that all threads have work to the end.
+    wanted: u64,
+}
+
+const CHUNK_SIZES: ChunkSizes = ChunkSizes { min: 1 << 17, max: 1 << 20, wanted: 16 };
 /// Bytes of working memory per point of a chunk in core, besides its rows.
 const CHUNK_BYTES_PER_POINT: u64 = 80;
 
@@ -204,6 +210,14 @@ impl<'a> Phases<'a> {
 /// What is wrong with an input, the options, the disk; [`Error::Interrupted`] when cancelled.
 /// Nothing is left at the output's place then that was not there before.
 pub fn build(config: &BuildConfig, progress: &dyn Progress) -> Result<BuildReport> {
+    build_in_chunks(config, CHUNK_SIZES, progress)
+}
+
+fn build_in_chunks(
+    config: &BuildConfig,
+    sizes: ChunkSizes,
+    progress: &dyn Progress,
+) -> Result<BuildReport> {
     if !(4..=1024).contains(&config.grid) || !config.grid.is_power_of_two() {
         return Err(Error::Setup(format!(
             "--grid {}: must be a power of two from 4 to 1024",
@@ -221,11 +235,12 @@ pub fn build(config: &BuildConfig, progress: &dyn Progress) -> Result<BuildRepor
         .num_threads(threads)
         .build()
         .map_err(|e| Error::Setup(format!("cannot start {threads} threads: {e}")))?;
-    pool.install(|| build_in_pool(config, threads, progress))
+    pool.install(|| build_in_pool(config, sizes, threads, progress))
 }
 
 fn build_in_pool(
     config: &BuildConfig,
+    sizes: ChunkSizes,
     threads: usize,
     progress: &dyn Progress,
 ) -> Result<BuildReport> {
@@ -267,13 +282,12 @@ fn build_in_pool(
     let mut store = raw.place(choice.placements, choice.lattice, &read.schema);
     let spilled = matches!(store, Store::File(_));
     let leaf_capacity = LEAF_CAPACITY_PER_CELL_OF_A_FACE * config.grid * config.grid;
-    let capacity = (points / CHUNKS_WANTED)
-        .clamp(CHUNK_POINTS_MIN, CHUNK_POINTS_MAX)
-        .max(u64::from(leaf_capacity));
+    let capacity =
+        (points / sizes.wanted).clamp(sizes.min, sizes.max).max(u64::from(leaf_capacity));
     let mut plan = Plan::new(choice.lattice.side_bits);
     let row_bytes = read.schema.row_bytes;
     let scan = distribute::count(&mut store, &mut plan, capacity, row_bytes, &check)?;
-    check_chunks(&plan, config.memory_bytes)?;
+    check_chunks(&plan, capacity, config.memory_bytes)?;
     let constant = constant_attributes(&read.schema, &scan.constant_bytes);
     let layout = Layout::new(&read.schema, &constant, &scan.first_row);
     let mut manifest = Manifest {
@@ -334,7 +348,8 @@ fn build_in_pool(
         Ok(())
     })?;
     drop(points_by_chunk);
-    drop(skins);
+    let skins: Vec<Arc<Skin>> =
+        skins.into_iter().filter_map(|skin| skin.into_inner().expect("no holder panics")).collect();
 
     phases.begin("join", 0, "");
     let mut nodes = Vec::new();
@@ -349,9 +364,9 @@ fn build_in_pool(
     }
     if !roots.is_empty() {
         let top = if choice.lattice.side_bits <= <u64 as MortonCode>::AXIS_BITS {
-            join::<u64>(&context, roots, chunks as u32)?
+            join::<u64>(&context, roots, &skins, chunks as u32)?
         } else {
-            join::<u128>(&context, roots, chunks as u32)?
+            join::<u128>(&context, roots, &skins, chunks as u32)?
         };
         nodes.extend(top.nodes);
         ranges.merge(&top.ranges);
@@ -513,10 +528,10 @@ fn constant_attributes(schema: &Schema, constant_bytes: &[bool]) -> Vec<bool> {
         .collect()
 }
 
-fn check_chunks(plan: &Plan, memory_bytes: u64) -> Result<()> {
+fn check_chunks(plan: &Plan, capacity: u64, memory_bytes: u64) -> Result<()> {
     let Some(largest) = plan.chunks.iter().max_by_key(|c| c.points) else { return Ok(()) };
     let needed = largest.points * CHUNK_BYTES_PER_POINT;
-    if largest.points > CHUNK_POINTS_MAX && needed > memory_bytes {
+    if largest.points > capacity && needed > memory_bytes {
         return Err(Error::Setup(format!(
             "{} points coincide in one place; building them takes {} MiB: raise --memory",
             largest.points,
@@ -550,7 +565,12 @@ struct Joined {
 }
 
 /// Builds the tree above the chunks from what stands for each, and completes the chunks' roots.
-fn join<C: MortonCode>(context: &Context, roots: Vec<chunk::Root>, part: u32) -> Result<Joined> {
+fn join<C: MortonCode>(
+    context: &Context,
+    roots: Vec<chunk::Root>,
+    skins: &[Arc<Skin>],
+    part: u32,
+) -> Result<Joined> {
     let lattice = &context.manifest.lattice;
     let row_bytes = context.layout.row_bytes;
     let mut codes: Vec<C> = Vec::new();
@@ -562,7 +582,10 @@ fn join<C: MortonCode>(context: &Context, roots: Vec<chunk::Root>, part: u32) ->
     }
     let tree = Tree::above(&leaves);
     let domain = Domain { corner: [0; 3], bits: lattice.side_bits, grid_bits: context.grid_bits };
-    let sampled = poisson::sample(&tree, &codes, domain, &[]);
+    // Chunks reach up to different levels: beside a node sampled here there may be nodes of the same
+    // level that were sampled in their chunk.
+    let skins: Vec<&Skin> = skins.iter().map(AsRef::as_ref).collect();
+    let sampled = poisson::sample(&tree, &codes, domain, &skins);
     // A leaf of this tree is a chunk's root.
     let root_index: HashMap<NodeKey, usize> =
         leaves.iter().enumerate().map(|(i, (key, _))| (*key, i)).collect();
@@ -624,4 +647,135 @@ fn join<C: MortonCode>(context: &Context, roots: Vec<chunk::Root>, part: u32) ->
         joined.nodes.push(node);
     }
     Ok(joined)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::{VerifyConfig, verify};
+    use proptest::prelude::*;
+
+    struct Quiet;
+
+    impl Progress for Quiet {
+        fn phase(&self, _: &str, _: u64, _: &str) {}
+        fn advance(&self, _: u64) {}
+        fn warn(&self, _: &str) {}
+    }
+
+    /// Clouds that octrees find hard: noise, needles, sheets, clumps, duplicates, outliers.
+    fn cloud() -> impl Strategy<Value = Vec<[i64; 3]>> {
+        let shape = prop_oneof![
+            Just([1 << 20, 1 << 20, 1 << 20]),
+            Just([1 << 20, 1 << 18, 64]),
+            Just([1 << 22, 4, 4]),
+            Just([16, 16, 16]),
+            Just([1, 1, 1]),
+            Just([1 << 31, 1 << 31, 1 << 31]),
+        ];
+        let clump = (shape, any::<[u16; 3]>(), 1usize..600, any::<u64>());
+        prop::collection::vec(clump, 1..4).prop_map(|clumps| {
+            let mut points = Vec::new();
+            for (shape, at, count, seed) in clumps {
+                let mut state = seed | 1;
+                let mut next = |limit: i64| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    i64::try_from(state >> 33).unwrap_or(0) % limit
+                };
+                for _ in 0..count {
+                    points.push(std::array::from_fn(|a| i64::from(at[a]) + next(shape[a])));
+                }
+            }
+            points
+        })
+    }
+
+    fn config(
+        folder: &Path,
+        points: &[[i64; 3]],
+        threads: usize,
+        memory_bytes: u64,
+    ) -> BuildConfig {
+        let input = folder.join("cloud.xyz");
+        let text: String =
+            points.iter().enumerate().map(|(i, [x, y, z])| format!("{x} {y} {z} {i}\n")).collect();
+        std::fs::write(&input, text).expect("temporary folder");
+        BuildConfig {
+            inputs: vec![input.display().to_string()],
+            output: folder.join(format!("out-{threads}-{memory_bytes}.lods")),
+            method: Method::Poisson,
+            grid: 4,
+            memory_bytes,
+            threads: Some(threads),
+            drop_attributes: Vec::new(),
+            columns: Some("x,y,z,number".into()),
+            scale: None,
+            cancel: Arc::default(),
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn every_point_is_kept_at_its_distance_in_the_same_bytes(points in cloud()) {
+            let folder = tempfile::tempdir().expect("temporary folder");
+            let sizes = ChunkSizes { min: 40, max: 200, wanted: 16 };
+            let mut files = Vec::new();
+            for (threads, memory) in [(1, 1 << 30), (3, 1 << 30), (2, 32 << 10)] {
+                let config = config(folder.path(), &points, threads, memory);
+                let report = build_in_chunks(&config, sizes, &Quiet).expect("builds");
+                prop_assert_eq!(report.points_written, points.len() as u64);
+                files.push(std::fs::read(&config.output).expect("written"));
+                let verified = verify(
+                    &VerifyConfig {
+                        dataset: config.output.clone(),
+                        against: config.inputs.clone(),
+                        columns: config.columns.clone(),
+                        cancel: Arc::default(),
+                    },
+                    &Quiet,
+                );
+                let verified = verified.expect("opens");
+                prop_assert!(verified.is_sound(), "{:?}", verified.findings);
+                prop_assert!(verified.against.is_some_and(|c| c.identical));
+            }
+            prop_assert!(files[0] == files[1], "threads change the bytes");
+            prop_assert!(files[0] == files[2], "memory changes the bytes");
+        }
+    }
+
+    #[test]
+    fn points_beyond_memory_go_through_the_disk_to_the_same_bytes() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let points: Vec<[i64; 3]> =
+            (0..5000i64).map(|i| [i * 7919 % 1000, i * 104_729 % 1000, i % 10]).collect();
+        let sizes = ChunkSizes { min: 40, max: 200, wanted: 16 };
+        let built = [1 << 30, 64 << 10].map(|memory| {
+            let config = config(folder.path(), &points, 2, memory);
+            let report = build_in_chunks(&config, sizes, &Quiet).expect("builds");
+            assert_eq!(report.spilled, memory < 1 << 20);
+            std::fs::read(&config.output).expect("written")
+        });
+        assert!(built[0] == built[1], "memory changes the bytes");
+    }
+
+    #[test]
+    fn a_cancelled_build_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let config = config(folder.path(), &[[0, 0, 0], [5, 5, 5]], 1, 1 << 20);
+        config.cancel.store(true, Ordering::Relaxed);
+        let result = build(&config, &Quiet);
+        assert!(matches!(result, Err(Error::Interrupted)), "{result:?}");
+        let left: Vec<_> = std::fs::read_dir(folder.path()).expect("there").collect();
+        assert_eq!(left.len(), 1, "only the input is there: {left:?}");
+    }
+
+    #[test]
+    fn a_folder_is_no_output() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let mut config = config(folder.path(), &[[0, 0, 0]], 1, 1 << 20);
+        config.output = folder.path().to_path_buf();
+        let error = build(&config, &Quiet).expect_err("refused").to_string();
+        assert!(error.contains("is a folder; name a file"), "{error}");
+    }
 }

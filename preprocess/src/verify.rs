@@ -20,7 +20,7 @@ use crate::{
     build::Progress,
     error::{Error, Result},
     file::FileSource,
-    grid::{self, InputCoordinates, Placement},
+    grid::{self, InputCoordinates},
     inputs,
     readers::CoordinateKind,
     schema::{RowMap, Schema},
@@ -421,12 +421,6 @@ fn compare(
         comparison.dropped += read.dropped.iter().map(|(_, n)| n).sum::<u64>();
         let coordinates = InputCoordinates { kind, bounds: writer.bounds[0] };
         let placement = grid::placement_on(&manifest.lattice, &coordinates);
-        if let Placement::Rounded { .. } = placement
-            && matches!(kind, CoordinateKind::Scaled { .. })
-            && manifest.largest_rounding == 0.0
-        {
-            report.find(format!("{path}: its coordinates do not lie on the dataset's lattice"));
-        }
         let store = writer.finish()?.place(vec![placement], manifest.lattice, &schema);
         let Store::Memory { blocks, rounding } = store else {
             return Err(Error::Setup(format!("input {index} left memory")));

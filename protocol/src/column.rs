@@ -206,7 +206,9 @@ fn component<T: Scalar>(values: &[u8], component: usize, components: usize) -> V
     let size = size_of::<T>();
     values
         .chunks_exact(size * components)
-        .map(|v| bytemuck::pod_read_unaligned::<T>(&v[component * size..][..size]).swap_if_big_endian())
+        .map(|v| {
+            bytemuck::pod_read_unaligned::<T>(&v[component * size..][..size]).swap_if_big_endian()
+        })
         .collect()
 }
 
