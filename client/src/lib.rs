@@ -1,5 +1,6 @@
 //! lodestream: client.
 
 pub mod camera;
+pub mod engine;
 pub mod render;
 pub mod source;

@@ -1,0 +1,162 @@
+//! The letter boxes of the two threads.
+//!
+//! Each is one mutex around everything that can be new, and one way to wake its reader, which
+//! checks for news under that mutex: no wake-up can be lost, and there is no second monitor to
+//! lock in another order. The view and the demand are latest-wins; events queue up, bounded by the
+//! loader, which stops asking while too much of what it delivered is unread.
+
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+use super::{event::Event, piece::Piece, view::View};
+
+/// What the traversal thread reads.
+#[derive(Debug, Default)]
+pub(super) struct TraversalInbox {
+    state: Mutex<TraversalMail>,
+    news: Condvar,
+}
+
+/// The newest of everything.
+#[derive(Debug, Default)]
+pub(super) struct TraversalMail {
+    /// The view, and how often it has changed.
+    pub view: Option<View>,
+    /// Wanted attributes, where they have changed.
+    pub attributes: Option<Vec<String>>,
+    /// Counts changes of the view and of the attributes.
+    pub generation: u64,
+    /// From the loader, oldest first.
+    pub events: Vec<Event>,
+    /// Events ever posted.
+    pub posted: u64,
+    /// Whether to end.
+    pub shutdown: bool,
+    unread_view: bool,
+}
+
+impl TraversalInbox {
+    /// Sets the view; the same view again is no news. Calls `changed` with the new generation
+    /// before the traversal can see it. Returns the generation.
+    pub fn set_view(&self, view: View, changed: impl FnOnce(u64)) -> u64 {
+        let mut mail = lock(&self.state);
+        if mail.view != Some(view) {
+            mail.view = Some(view);
+            mail.unread_view = true;
+            mail.generation += 1;
+            changed(mail.generation);
+            self.news.notify_one();
+        }
+        mail.generation
+    }
+
+    /// Sets the wanted attributes. Returns the generation.
+    pub fn set_attributes(&self, attributes: Vec<String>, changed: impl FnOnce(u64)) -> u64 {
+        let mut mail = lock(&self.state);
+        mail.attributes = Some(attributes);
+        mail.generation += 1;
+        changed(mail.generation);
+        self.news.notify_one();
+        mail.generation
+    }
+
+    /// The newest generation, and whether there is a view at all.
+    pub fn generation(&self) -> (u64, bool) {
+        let mail = lock(&self.state);
+        (mail.generation, mail.view.is_some())
+    }
+
+    /// Posts an event; returns its number, counting from 1.
+    pub fn post(&self, event: Event) -> u64 {
+        let mut mail = lock(&self.state);
+        mail.events.push(event);
+        mail.posted += 1;
+        self.news.notify_one();
+        mail.posted
+    }
+
+    /// Tells the thread to end.
+    pub fn shut_down(&self) {
+        lock(&self.state).shutdown = true;
+        self.news.notify_one();
+    }
+
+    /// Waits for news and takes all of it.
+    pub fn take(&self) -> TraversalMail {
+        let mut mail = lock(&self.state);
+        while mail.events.is_empty()
+            && mail.attributes.is_none()
+            && !mail.unread_view
+            && !mail.shutdown
+        {
+            mail = self.news.wait(mail).unwrap_or_else(PoisonError::into_inner);
+        }
+        mail.unread_view = false;
+        TraversalMail {
+            view: mail.view,
+            attributes: mail.attributes.take(),
+            generation: mail.generation,
+            events: std::mem::take(&mut mail.events),
+            posted: mail.posted,
+            shutdown: mail.shutdown,
+            unread_view: false,
+        }
+    }
+}
+
+/// What the traversal wants loaded.
+#[derive(Debug, Default)]
+pub(super) struct Demand {
+    /// Most important first.
+    pub pieces: Vec<Piece>,
+    /// Events that the traversal had read when it wrote this.
+    pub seen: u64,
+}
+
+/// What the loader thread reads.
+#[derive(Debug, Default)]
+pub(super) struct LoaderInbox {
+    state: Mutex<LoaderMail>,
+    /// Stores one permit: a wake-up before the wait is not lost.
+    news: tokio::sync::Notify,
+}
+
+/// The newest demand.
+#[derive(Debug, Default)]
+pub(super) struct LoaderMail {
+    /// Replaces the one before.
+    pub demand: Option<Demand>,
+    /// Whether to end.
+    pub shutdown: bool,
+}
+
+impl LoaderInbox {
+    /// Replaces the demand.
+    pub fn set_demand(&self, demand: Demand) {
+        lock(&self.state).demand = Some(demand);
+        self.news.notify_one();
+    }
+
+    /// Tells the thread to end.
+    pub fn shut_down(&self) {
+        lock(&self.state).shutdown = true;
+        self.news.notify_one();
+    }
+
+    /// Waits for news and takes all of it.
+    pub async fn take(&self) -> LoaderMail {
+        loop {
+            {
+                let mut mail = lock(&self.state);
+                if mail.demand.is_some() || mail.shutdown {
+                    return LoaderMail { demand: mail.demand.take(), shutdown: mail.shutdown };
+                }
+            }
+            self.news.notified().await;
+        }
+    }
+}
+
+/// A thread that panicked while it held a lock leaves whole values behind: every change is a move.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,46 @@
+//! From bytes to nodes, on the rayon pool.
+
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    time::Instant,
+};
+
+use bytes::Bytes;
+use lodestream_protocol::{Boot, DecodedGroup, Error, HierarchyPage, Manifest, decode_group};
+
+use super::super::piece::{Part, Piece};
+
+/// A decoded piece.
+#[derive(Debug)]
+pub enum Decoded {
+    Page(HierarchyPage),
+    Group(DecodedGroup),
+}
+
+/// Decodes, and says how many nanoseconds that took.
+pub fn decode(piece: &Piece, boot: &Boot, bytes: &Bytes) -> (Result<Decoded, Error>, u64) {
+    let begin = Instant::now();
+    // A panic in a codec on damaged bytes would end the process from inside the pool.
+    let result = catch_unwind(AssertUnwindSafe(|| match piece.id.part {
+        Part::Page => boot.parse_child_page(bytes, &piece.node).map(Decoded::Page),
+        Part::Group(group) => {
+            decode_group(&boot.manifest, group, &piece.node, bytes).map(Decoded::Group)
+        }
+    }));
+    let result = result.unwrap_or_else(|_| {
+        Err(Error::Corrupt { what: "node", why: "the decoder gave up on these bytes".into() })
+    });
+    (result, u64::try_from(begin.elapsed().as_nanos()).unwrap_or(u64::MAX))
+}
+
+/// An estimate of the bytes that a piece takes once it is decoded.
+pub fn decoded_bytes(piece: &Piece, manifest: &Manifest) -> u64 {
+    match piece.id.part {
+        Part::Page => piece.len.saturating_mul(4),
+        Part::Group(group) => {
+            let position = if group == 0 { size_of::<[u32; 3]>() } else { 0 };
+            let columns: usize = manifest.columns_of(group).map(|a| a.value_bytes()).sum();
+            u64::from(piece.node.points) * (position + columns) as u64
+        }
+    }
+}

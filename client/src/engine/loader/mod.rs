@@ -1,0 +1,394 @@
+//! The loader thread: turns demands into requests, and answers into events.
+//!
+//! Owned by the engine; owns an async runtime of one thread, which all requests run on; decoding
+//! goes to the rayon pool. A demand replaces the one before: what is no longer wanted is forgotten
+//! if it was queued, and broken off if it was in flight and not nearly done. Failures of a host
+//! pause that host, failures of a piece pause that piece; neither ends anything.
+
+mod coalesce;
+mod cutter;
+mod decode;
+mod flight;
+mod open;
+mod pieces;
+
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+    time::Instant,
+};
+
+use bytes::Bytes;
+use lodestream_protocol::{Boot, Error};
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+
+use crate::source::{Backoff, Source, SourceError};
+
+use self::{
+    coalesce::Wanted,
+    decode::Decoded,
+    flight::{Flight, FlightId},
+    open::Opened,
+    pieces::{PieceState, Pieces},
+};
+use super::{
+    config::EngineConfig,
+    event::Event,
+    inbox::Demand,
+    piece::{Part, Piece, PieceId},
+    shared::Shared,
+};
+
+/// No request is started while more decoded bytes than this wait for the traversal.
+const MAX_BACKLOG_BYTES: u64 = 128 << 20;
+
+/// A piece that arrived damaged this often is damaged at the source.
+const MAX_DAMAGED: u32 = 3;
+
+/// What the loader's tasks tell it. At most one message per piece and request is ever waiting.
+#[derive(Debug)]
+enum Message {
+    Opened {
+        cloud: usize,
+        result: Result<Opened, String>,
+    },
+    /// The piece with that index among the flight's.
+    Arrived {
+        flight: FlightId,
+        index: usize,
+        bytes: Bytes,
+    },
+    Finished {
+        flight: FlightId,
+        result: Result<(), SourceError>,
+    },
+    Decoded {
+        piece: PieceId,
+        result: Result<Decoded, Error>,
+    },
+}
+
+/// What the loader knows of a cloud.
+#[derive(Debug)]
+struct Cloud {
+    source: Source,
+    boot: Option<Arc<Boot>>,
+    /// The first bytes of the file.
+    prefix: Bytes,
+    /// Failed requests in a row.
+    failures: u32,
+    /// No request before then.
+    not_before: Option<Instant>,
+    failed: bool,
+}
+
+/// The thread's state.
+pub(super) struct Loader {
+    shared: Arc<Shared>,
+    config: EngineConfig,
+    clouds: Vec<Cloud>,
+    demand: Vec<Piece>,
+    pieces: Pieces,
+    flights: HashMap<FlightId, Flight>,
+    next_flight: FlightId,
+    sender: UnboundedSender<Message>,
+    receiver: UnboundedReceiver<Message>,
+}
+
+impl Loader {
+    pub fn new(shared: Arc<Shared>, config: EngineConfig, sources: Vec<Source>) -> Self {
+        let (sender, receiver) = unbounded_channel();
+        let clouds = sources.into_iter().map(|source| Cloud {
+            source,
+            boot: None,
+            prefix: Bytes::new(),
+            failures: 0,
+            not_before: None,
+            failed: false,
+        });
+        Self {
+            shared,
+            config,
+            clouds: clouds.collect(),
+            demand: Vec::new(),
+            pieces: Pieces::default(),
+            flights: HashMap::new(),
+            next_flight: 0,
+            sender,
+            receiver,
+        }
+    }
+
+    /// Runs until the inbox says to end.
+    pub async fn run(mut self) {
+        for cloud in 0..self.clouds.len() {
+            let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
+            let source = self.clouds[cloud].source.clone();
+            tokio::spawn(async move {
+                let result = open::open(&shared, cloud, &source).await;
+                let _ = sender.send(Message::Opened { cloud, result });
+            });
+        }
+        loop {
+            let shared = Arc::clone(&self.shared);
+            let retry = self.next_retry();
+            tokio::select! {
+                mail = shared.loader.take() => {
+                    if mail.shutdown {
+                        return;
+                    }
+                    if let Some(demand) = mail.demand {
+                        self.accept(demand);
+                    }
+                }
+                // The loader holds a sender itself: there is always a next message.
+                Some(message) = self.receiver.recv() => self.handle(message),
+                () = sleep_until(retry) => {}
+            }
+            while let Ok(message) = self.receiver.try_recv() {
+                self.handle(message);
+            }
+            self.dispatch();
+        }
+    }
+
+    /// A new demand replaces the old one.
+    fn accept(&mut self, demand: Demand) {
+        self.demand = demand.pieces;
+        let wanted: HashSet<_> = self.demand.iter().map(|piece| piece.id).collect();
+        self.pieces.update(&wanted, demand.seen);
+        let pieces = &self.pieces;
+        let stale = self.flights.extract_if(|id, flight| {
+            let mut open = flight.pieces.iter().filter(|piece| pieces.is_loading(piece.id, *id));
+            !open.any(|piece| wanted.contains(&piece.id)) && !flight.is_nearly_done()
+        });
+        let stale: Vec<_> = stale.collect();
+        for (id, flight) in stale {
+            self.shared.counters.cancelled.add(1);
+            self.break_off(id, &flight);
+        }
+    }
+
+    fn break_off(&mut self, id: FlightId, flight: &Flight) {
+        flight.abort();
+        for piece in &flight.pieces {
+            if self.pieces.is_loading(piece.id, id) {
+                self.pieces.clear(piece.id);
+            }
+        }
+    }
+
+    fn handle(&mut self, message: Message) {
+        match message {
+            Message::Opened { cloud, result: Ok(opened) } => {
+                self.clouds[cloud].boot = Some(Arc::clone(&opened.boot));
+                self.clouds[cloud].prefix = opened.prefix;
+                self.shared.traversal.post(Event::Opened { cloud, boot: opened.boot });
+            }
+            Message::Opened { cloud, result: Err(message) } => self.fail_cloud(cloud, message),
+            Message::Arrived { flight, index, bytes } => {
+                let Some(flight_) = self.flights.get(&flight) else { return };
+                let piece = flight_.pieces[index].clone();
+                if self.pieces.is_loading(piece.id, flight) {
+                    self.start_decoding(piece, bytes);
+                }
+            }
+            Message::Finished { flight, result } => {
+                // A flight that was broken off is no longer there.
+                if let Some(ended) = self.flights.remove(&flight) {
+                    self.finish(flight, &ended, result);
+                }
+            }
+            Message::Decoded { piece, result } => self.deliver(piece, result),
+        }
+    }
+
+    fn start_decoding(&mut self, piece: Piece, bytes: Bytes) {
+        let Some(boot) = self.clouds[piece.id.node.cloud].boot.clone() else { return };
+        let size = decode::decoded_bytes(&piece, &boot.manifest);
+        self.pieces.set(piece.id, PieceState::Decoding { bytes: size });
+        let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
+        rayon::spawn(move || {
+            let (result, nanos) = decode::decode(&piece, &boot, &bytes);
+            shared.counters.decode_nanos.add(nanos);
+            let _ = sender.send(Message::Decoded { piece: piece.id, result });
+        });
+    }
+
+    fn deliver(&mut self, id: PieceId, result: Result<Decoded, Error>) {
+        if !matches!(self.pieces.get(id), Some(PieceState::Decoding { .. })) {
+            return;
+        }
+        let cloud = &mut self.clouds[id.node.cloud];
+        let event = match result {
+            Ok(decoded) => {
+                self.shared.counters.decoded_nodes.add(1);
+                match (decoded, id.part) {
+                    (Decoded::Group(decoded), Part::Group(group)) => {
+                        Event::Group { node: id.node, group, decoded }
+                    }
+                    (Decoded::Page(page), _) => {
+                        Event::Page { cloud: id.node.cloud, parent: id.node.key, page }
+                    }
+                    (Decoded::Group(_), Part::Page) => return,
+                }
+            }
+            Err(error) => {
+                self.shared.counters.damaged.add(1);
+                // Should the damage be in the bytes at hand, the next try must not use them.
+                cloud.prefix = Bytes::new();
+                let failures = self.pieces.count_damaged(id);
+                if failures < MAX_DAMAGED {
+                    let until = Instant::now() + Backoff::default().delay(failures);
+                    self.pieces.set(id, PieceState::Failed { until });
+                    return;
+                }
+                let place = cloud.source.describe();
+                let message = format!("{place}: node {}: {error}; left out", id.node.key);
+                Event::Lost { piece: id, message }
+            }
+        };
+        let number = self.shared.traversal.post(event);
+        self.pieces.deliver(id, number);
+    }
+
+    /// A request has ended, well or not.
+    fn finish(&mut self, id: FlightId, flight: &Flight, result: Result<(), SourceError>) {
+        let cloud = &mut self.clouds[flight.cloud];
+        let error = match result {
+            Ok(()) => {
+                cloud.not_before = None;
+                if std::mem::take(&mut cloud.failures) > 0 {
+                    self.shared.board.post(|news| news.clouds[flight.cloud].trouble = None);
+                }
+                return;
+            }
+            Err(error) => error,
+        };
+        if !error.is_transient() {
+            self.fail_cloud(flight.cloud, error.to_string());
+            self.break_off(id, flight);
+            return;
+        }
+        self.shared.counters.retries.add(1);
+        self.shared.board.post(|news| news.clouds[flight.cloud].trouble = Some(error.to_string()));
+        cloud.failures = cloud.failures.saturating_add(1);
+        cloud.not_before = Some(Instant::now() + Backoff::default().delay(cloud.failures));
+        let missing = flight.pieces.iter().filter(|piece| self.pieces.is_loading(piece.id, id));
+        let missing: Vec<_> = missing.map(|piece| piece.id).collect();
+        for (index, id) in missing.into_iter().enumerate() {
+            // The first that did not arrive is where it went wrong; the rest are bystanders.
+            if index == 0 {
+                let failures = self.pieces.count_broken(id);
+                let until = Instant::now() + Backoff::default().delay(failures);
+                self.pieces.set(id, PieceState::Failed { until });
+            } else {
+                self.pieces.clear(id);
+            }
+        }
+    }
+
+    /// Nothing more can be had from that cloud.
+    fn fail_cloud(&mut self, cloud: usize, message: String) {
+        if std::mem::replace(&mut self.clouds[cloud].failed, true) {
+            return;
+        }
+        let flights: Vec<_> = self.flights.extract_if(|_, f| f.cloud == cloud).collect();
+        for (id, flight) in flights {
+            self.break_off(id, &flight);
+        }
+        self.shared.traversal.post(Event::CloudFailed { cloud, message });
+    }
+
+    /// Starts what may be started.
+    fn dispatch(&mut self) {
+        let now = Instant::now();
+        self.take_from_prefixes(now);
+        let free = self.config.requests_in_flight.max(1).saturating_sub(self.flights.len());
+        if free > 0 && self.pieces.backlog_bytes() <= MAX_BACKLOG_BYTES {
+            for run in self.runs(now).into_iter().take(free) {
+                self.start_flight(run);
+            }
+        }
+        let queued = self.demand.iter().filter(|piece| self.pieces.get(piece.id).is_none()).count();
+        self.shared.counters.queued.set(queued as u64);
+        self.shared.counters.in_flight.set(self.flights.len() as u64);
+    }
+
+    /// Decodes wanted pieces whose bytes came with the first answer, and those without bytes.
+    fn take_from_prefixes(&mut self, now: Instant) {
+        let mut found = Vec::new();
+        for piece in &self.demand {
+            let cloud = &self.clouds[piece.id.node.cloud];
+            let here = if piece.len == 0 {
+                Some(Bytes::new())
+            } else {
+                let range =
+                    usize::try_from(piece.offset).ok().zip(usize::try_from(piece.end()).ok());
+                range
+                    .filter(|&(start, end)| start < end && end <= cloud.prefix.len())
+                    .map(|(start, end)| cloud.prefix.slice(start..end))
+            };
+            if let Some(bytes) = here
+                && !cloud.failed
+                && self.pieces.is_free(piece.id, now)
+            {
+                found.push((piece.clone(), bytes));
+            }
+        }
+        for (piece, bytes) in found {
+            self.start_decoding(piece, bytes);
+        }
+    }
+
+    /// The requests that the demand comes to, most important first.
+    fn runs(&self, now: Instant) -> Vec<Vec<Piece>> {
+        let mut wanted: Vec<Vec<Wanted>> = vec![Vec::new(); self.clouds.len()];
+        for (rank, piece) in self.demand.iter().enumerate() {
+            let cloud = &self.clouds[piece.id.node.cloud];
+            let paused = cloud.not_before.is_some_and(|until| until > now);
+            if !paused && !cloud.failed && self.pieces.is_free(piece.id, now) {
+                let alone = self.pieces.needs_own_request(piece.id);
+                let wanted = &mut wanted[piece.id.node.cloud];
+                wanted.push(Wanted { rank, offset: piece.offset, len: piece.len, alone });
+            }
+        }
+        let coalesced =
+            wanted.into_iter().flat_map(|w| coalesce::coalesce(w, self.config.coalesce));
+        let mut runs: Vec<_> = coalesced.collect();
+        runs.sort_by_key(|run| run.rank());
+        let pieces = runs
+            .iter()
+            .map(|run| run.parts.iter().map(|part| self.demand[part.rank].clone()).collect());
+        pieces.collect()
+    }
+
+    fn start_flight(&mut self, pieces: Vec<Piece>) {
+        let Some(first) = pieces.first() else { return };
+        let source = self.clouds[first.id.node.cloud].source.clone();
+        let id = self.next_flight;
+        self.next_flight += 1;
+        for piece in &pieces {
+            self.pieces.set(piece.id, PieceState::Loading { flight: id });
+        }
+        let shared = Arc::clone(&self.shared);
+        self.flights.insert(id, Flight::start(id, source, pieces, shared, self.sender.clone()));
+    }
+
+    /// When something that waits after a failure may go on.
+    fn next_retry(&self) -> Option<Instant> {
+        let now = Instant::now();
+        let pieces = self.demand.iter().filter_map(|piece| self.pieces.retry_at(piece.id));
+        let wanted: HashSet<_> = self.demand.iter().map(|piece| piece.id.node.cloud).collect();
+        let clouds = wanted.into_iter().filter_map(|cloud| self.clouds[cloud].not_before);
+        // What is past waits for a free request, not for the clock.
+        clouds.chain(pieces).filter(|&at| at > now).min()
+    }
+}
+
+async fn sleep_until(at: Option<Instant>) {
+    match at {
+        Some(at) => tokio::time::sleep_until(at.into()).await,
+        None => std::future::pending().await,
+    }
+}

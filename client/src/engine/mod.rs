@@ -1,0 +1,218 @@
+//! The streaming engine: from sources and a view to what is to be drawn (Fraiss 2017, 3.2).
+//!
+//! Three threads, each with one job:
+//! - the caller's (a window's render thread, or a tool): [`Engine::set_view`] and
+//!   [`Engine::plan`], neither of which ever waits for the other two;
+//! - the traversal thread (`traversal.rs`): decides what is drawn and what is loaded;
+//! - the loader thread (`loader/`): requests, decoding, retries.
+//!
+//! They talk through two letter boxes (`inbox.rs`) and one board (`board.rs`). The view and the
+//! demand are latest-wins, everything else is bounded. With nothing to do, all threads sleep. The
+//! engine knows no GPU: whoever draws takes a [`FramePlan`] and reads its nodes.
+
+mod board;
+mod config;
+mod drawing;
+mod error;
+mod event;
+mod inbox;
+mod loader;
+mod piece;
+mod plan;
+mod selection;
+mod shared;
+mod stats;
+mod store;
+mod traversal;
+mod tree;
+mod view;
+
+use std::{sync::Arc, thread::JoinHandle, time::Duration};
+
+use lodestream_protocol::Boot;
+
+pub use board::CloudStatus;
+pub use config::{Coalesce, EngineConfig};
+pub use error::EngineError;
+pub use plan::{DrawNode, FramePlan, LeftOut, Tally};
+pub use stats::{EngineStats, Phase, Totals};
+pub use view::View;
+
+use self::{
+    board::News,
+    loader::Loader,
+    shared::{EndOfThread, Shared},
+    traversal::Traversal,
+};
+use crate::source::Source;
+
+/// A running engine. Dropping it ends and joins its threads at once, requests or not.
+#[derive(Debug)]
+pub struct Engine {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Engine {
+    /// Starts the threads and begins to open the sources; clouds keep the order of `sources`.
+    ///
+    /// # Errors
+    /// [`EngineError::Thread`] where the system gives no thread.
+    pub fn start(sources: Vec<Source>, config: EngineConfig) -> Result<Self, EngineError> {
+        let shared = Arc::new(Shared::new(sources.iter().map(Source::describe)));
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let traversal = Traversal::new(Arc::clone(&shared), &config, sources.len());
+        let loader = Loader::new(Arc::clone(&shared), config, sources);
+        // From here on, dropping the engine ends whatever threads it has.
+        let mut engine = Self { shared, threads: Vec::new() };
+        engine.spawn("traversal", || traversal.run())?;
+        engine.spawn("loader", move || {
+            runtime.block_on(loader.run());
+            // Does not wait for a file system or a name server that hangs.
+            runtime.shutdown_background();
+        })?;
+        Ok(engine)
+    }
+
+    fn spawn(
+        &mut self,
+        name: &str,
+        run: impl FnOnce() + Send + 'static,
+    ) -> Result<(), EngineError> {
+        let end = EndOfThread(Arc::clone(&self.shared));
+        let thread = std::thread::Builder::new().name(name.into()).spawn(move || {
+            let _end = end;
+            run();
+        })?;
+        self.threads.push(thread);
+        Ok(())
+    }
+
+    /// How the clouds are, in the order of the sources.
+    #[must_use]
+    pub fn clouds(&self) -> Vec<CloudStatus> {
+        self.shared.board.read(|news| news.clouds.clone())
+    }
+
+    /// Waits until every cloud's header, manifest and root page are loaded.
+    ///
+    /// # Errors
+    /// [`EngineError::Cloud`] for the first source that can never be read;
+    /// [`EngineError::Timeout`] with the last trouble.
+    pub fn wait_open(&self, timeout: Duration) -> Result<Vec<Arc<Boot>>, EngineError> {
+        self.wait(timeout, |news| news.clouds.iter().map(|cloud| cloud.boot.clone()).collect())
+    }
+
+    /// Sets the view; the newest one counts. Never waits. Returns the view's number, which
+    /// [`FramePlan::view_generation`] repeats; the same view again keeps its number.
+    pub fn set_view(&self, view: View) -> u64 {
+        self.shared.traversal.set_view(view, |generation| self.start_phase(generation))
+    }
+
+    /// Sets the attributes that the view needs (see [`EngineConfig::attributes`]); counts as a new
+    /// view. Never waits.
+    pub fn set_attributes(&self, attributes: Vec<String>) -> u64 {
+        self.shared.traversal.set_attributes(attributes, |generation| self.start_phase(generation))
+    }
+
+    fn start_phase(&self, generation: u64) {
+        let totals = self.shared.counters.totals();
+        self.shared.clock(|clock| clock.start_view(generation, totals));
+    }
+
+    /// The newest plan. Never waits.
+    #[must_use]
+    pub fn plan(&self) -> Arc<FramePlan> {
+        self.shared.board.read(|news| Arc::clone(&news.plan))
+    }
+
+    /// Waits for a plan newer than `sequence`; `None` where the time runs out.
+    #[must_use]
+    pub fn wait_plan(&self, sequence: u64, timeout: Duration) -> Option<Arc<FramePlan>> {
+        self.shared
+            .board
+            .wait(timeout, |news| (news.plan.sequence > sequence).then(|| Arc::clone(&news.plan)))
+    }
+
+    /// Waits until the picture of the newest view is complete: everything wanted is loaded, or has
+    /// failed for good ([`EngineStats::problems`] tells what).
+    ///
+    /// # Errors
+    /// [`EngineError::NoView`] before the first [`set_view`](Self::set_view);
+    /// [`EngineError::Cloud`] where a source can no longer be read; [`EngineError::Timeout`].
+    pub fn wait_settled(&self, timeout: Duration) -> Result<Arc<FramePlan>, EngineError> {
+        let (generation, has_view) = self.shared.traversal.generation();
+        if !has_view {
+            return Err(EngineError::NoView);
+        }
+        self.wait(timeout, |news| {
+            let plan = &news.plan;
+            (plan.settled && plan.view_generation >= generation).then(|| Arc::clone(plan))
+        })
+    }
+
+    fn wait<T>(
+        &self,
+        timeout: Duration,
+        found: impl Fn(&News) -> Option<T>,
+    ) -> Result<T, EngineError> {
+        let result = self.shared.board.wait(timeout, |news| {
+            if let Some(failure) = news.clouds.iter().find_map(|cloud| cloud.failure.clone()) {
+                return Some(Err(EngineError::Cloud(failure)));
+            }
+            if news.stopped {
+                return Some(Err(EngineError::Stopped));
+            }
+            found(news).map(Ok)
+        });
+        result.unwrap_or_else(|| {
+            let missing = self.shared.board.read(describe_missing);
+            Err(EngineError::Timeout { seconds: timeout.as_secs_f64(), missing })
+        })
+    }
+
+    /// Figures since the start and since the view last changed.
+    #[must_use]
+    pub fn stats(&self) -> EngineStats {
+        let counters = &self.shared.counters;
+        let totals = counters.totals();
+        let (since_start, since_view) = self.shared.clock(|clock| clock.phases(totals));
+        EngineStats {
+            since_start,
+            since_view,
+            queued: counters.queued.get(),
+            in_flight: counters.in_flight.get(),
+            pinned_bytes: counters.pinned_bytes.get(),
+            cached_bytes: counters.cached_bytes.get(),
+            problems: self.shared.board.read(|news| news.problems.clone()),
+        }
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        self.shared.traversal.shut_down();
+        self.shared.loader.shut_down();
+        for thread in self.threads.drain(..) {
+            // A thread that panicked has said so already.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What a plan that is not settled waits for.
+fn describe_missing(news: &News) -> String {
+    let plan = &news.plan;
+    let closed = news.clouds.iter().filter(|cloud| cloud.boot.is_none()).count();
+    let mut missing = if closed > 0 {
+        format!("{closed} of {} sources are not open", news.clouds.len())
+    } else {
+        let pages = plan.pages_loading;
+        format!("{} nodes and {pages} hierarchy pages are missing", plan.left_out.loading.nodes)
+    };
+    if let Some(trouble) = news.clouds.iter().find_map(|cloud| cloud.trouble.as_ref()) {
+        missing.push_str("; ");
+        missing.push_str(trouble);
+    }
+    missing
+}

@@ -1,0 +1,79 @@
+//! What to draw.
+
+use std::sync::Arc;
+
+use lodestream_protocol::{NodeKey, NodePoints};
+use serde::Serialize;
+
+use super::view::View;
+
+/// A node to draw.
+#[derive(Debug, Clone)]
+pub struct DrawNode {
+    /// Index of the cloud, in the order of the sources given to the engine.
+    pub cloud: usize,
+    /// The node.
+    pub key: NodeKey,
+    /// Its elements: positions, and the columns that have arrived. Columns of further groups may
+    /// still be missing while [`FramePlan::settled`] is false.
+    pub points: Arc<NodePoints>,
+}
+
+/// Nodes and their points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Tally {
+    /// Nodes.
+    pub nodes: u64,
+    /// Points in these nodes.
+    pub points: u64,
+}
+
+impl Tally {
+    pub(super) fn add(&mut self, points: u32) {
+        self.nodes += 1;
+        self.points += u64::from(points);
+    }
+}
+
+/// What a plan leaves out, by reason. Each node counts once, without those below it, which were
+/// not looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct LeftOut {
+    /// Outside the picture.
+    pub outside: Tally,
+    /// Smaller than [`EngineConfig::min_size_px`](super::EngineConfig::min_size_px).
+    pub small: Tally,
+    /// Did not fit into the point budget.
+    pub over_budget: Tally,
+    /// Wanted, but not loaded yet.
+    pub loading: Tally,
+    /// Wanted, but its bytes are damaged or cannot be had.
+    pub failed: Tally,
+}
+
+/// What to draw for one view. Plans are immutable; a newer one replaces an older one as a whole.
+#[derive(Debug, Clone, Default)]
+pub struct FramePlan {
+    /// Counts up with every plan.
+    pub sequence: u64,
+    /// The view it is made for, by the number that
+    /// [`Engine::set_view`](super::Engine::set_view) returned; 0 before the first.
+    pub view_generation: u64,
+    /// The view it is made for.
+    pub view: Option<View>,
+    /// Nodes to draw, ancestors before descendants, most important first.
+    pub nodes: Vec<DrawNode>,
+    /// Points in these nodes: never more than the point budget.
+    pub points: u64,
+    /// Points that are reserved for this view: what will be drawn, at most, once all is loaded.
+    pub points_wanted: u64,
+    /// Hierarchy pages that this view needs and that are not loaded yet.
+    pub pages_loading: u64,
+    /// What is left out.
+    pub left_out: LeftOut,
+    /// Bytes of decoded nodes that are kept though this plan does not need them.
+    pub cached_bytes: u64,
+    /// Whether this is all that the view will show: everything wanted is loaded, or has failed for
+    /// good.
+    pub settled: bool,
+}

@@ -1,0 +1,238 @@
+//! The traversal thread: decides what is drawn and what is loaded.
+//!
+//! Owned by the engine; sole owner of the trees and of all decoded nodes. It sleeps until the view
+//! changes or the loader has news, then walks the trees (if the view or a tree is new), resolves
+//! what can be drawn, publishes a plan and hands the loader a new demand.
+//!
+//! Node states and who knows them: unknown (nobody), queued, loading and failed-until (the loader),
+//! resident and lost (the store here), shown (in the plan).
+
+use std::{collections::HashSet, sync::Arc};
+
+use super::{
+    config::EngineConfig,
+    drawing::{self, Presence},
+    event::Event,
+    inbox::{Demand, TraversalMail},
+    piece::{NodeId, Part, Piece, PieceId},
+    plan::{DrawNode, FramePlan},
+    selection::{self, Limits, Pick, Selection},
+    shared::Shared,
+    store::{GroupMask, Store, group_bit},
+    tree::Tree,
+    view::{Optics, View},
+};
+
+/// Most bytes of one cloud that are asked of the loader at a time. More follow when these are in.
+const MAX_DEMAND_BYTES: u64 = 64 << 20;
+
+/// The thread's state.
+pub(super) struct Traversal {
+    shared: Arc<Shared>,
+    limits: Limits,
+    attributes: Vec<String>,
+    clouds: Vec<Cloud>,
+    trees: Vec<Option<Tree>>,
+    store: Store,
+    view: Option<View>,
+    view_generation: u64,
+    selection: Selection,
+    /// Nodes of the last view's selection, for hysteresis.
+    previous: HashSet<NodeId>,
+    sequence: u64,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Cloud {
+    /// Groups that a complete node has.
+    groups: GroupMask,
+    failed: bool,
+}
+
+impl Traversal {
+    pub fn new(shared: Arc<Shared>, config: &EngineConfig, clouds: usize) -> Self {
+        Self {
+            shared,
+            limits: Limits { point_budget: config.point_budget, min_size_px: config.min_size_px },
+            attributes: config.attributes.clone(),
+            clouds: vec![Cloud::default(); clouds],
+            trees: (0..clouds).map(|_| None).collect(),
+            store: Store::new(config.cache_bytes),
+            view: None,
+            view_generation: 0,
+            selection: Selection::default(),
+            previous: HashSet::new(),
+            sequence: 0,
+        }
+    }
+
+    /// Runs until the inbox says to end.
+    pub fn run(mut self) {
+        loop {
+            let mail = self.shared.traversal.take();
+            if mail.shutdown {
+                return;
+            }
+            let seen = mail.posted;
+            if self.read(mail) {
+                self.select();
+            }
+            self.publish(seen);
+        }
+    }
+
+    /// Takes in the news; returns whether another selection may be wanted.
+    fn read(&mut self, mail: TraversalMail) -> bool {
+        let mut reselect = false;
+        if mail.view != self.view {
+            self.previous = self.selection.picks.iter().map(|pick| pick.id).collect();
+            self.view = mail.view;
+            reselect = true;
+        }
+        self.view_generation = mail.generation;
+        if let Some(attributes) = mail.attributes {
+            self.attributes = attributes;
+            (0..self.clouds.len()).for_each(|cloud| self.update_groups(cloud));
+        }
+        for event in mail.events {
+            match event {
+                Event::Opened { cloud, boot } => {
+                    self.trees[cloud] = Some(Tree::new(Arc::clone(&boot)));
+                    self.update_groups(cloud);
+                    self.shared.board.post(|news| news.clouds[cloud].boot = Some(boot));
+                    reselect = true;
+                }
+                Event::CloudFailed { cloud, message } => {
+                    self.clouds[cloud].failed = true;
+                    self.shared.board.post(|news| {
+                        news.clouds[cloud].failure = Some(message.clone());
+                        news.add_problem(message);
+                    });
+                }
+                Event::Page { cloud, parent, page } => {
+                    if let Some(tree) = &mut self.trees[cloud] {
+                        tree.add_page(parent, page);
+                        reselect = true;
+                    }
+                }
+                Event::Group { node, group, decoded } => self.store.add(node, group, decoded),
+                Event::Lost { piece, message } => {
+                    self.store.lose(piece);
+                    self.shared.board.post(|news| news.add_problem(message));
+                }
+            }
+        }
+        reselect
+    }
+
+    /// Works out which groups the view needs of a cloud.
+    fn update_groups(&mut self, cloud: usize) {
+        let Some(tree) = &self.trees[cloud] else { return };
+        let manifest = &tree.boot().manifest;
+        let required = manifest.primitive.required_attributes().iter().map(|&(name, _)| name);
+        let wanted = self.attributes.iter().map(String::as_str);
+        self.clouds[cloud].groups = required
+            .chain(wanted)
+            .filter_map(|name| manifest.attribute(name)?.group())
+            .fold(group_bit(0), |mask, group| mask | group_bit(group));
+    }
+
+    fn select(&mut self) {
+        let Some(view) = &self.view else { return };
+        let optics = Optics::new(view);
+        self.selection = selection::select(&mut self.trees, &optics, self.limits, &self.previous);
+    }
+
+    /// Publishes the plan for the selection and what is loaded, and asks for the rest.
+    fn publish(&mut self, seen: u64) {
+        let drawing = drawing::draw(&self.selection.picks, |pick| self.presence(pick));
+        let needed = drawing.needed.iter().map(|&i| self.selection.picks[i].id).collect();
+        let moved = self.store.pin(&needed);
+
+        let mut plan = FramePlan {
+            view_generation: self.view_generation,
+            view: self.view,
+            points_wanted: self.selection.points,
+            left_out: self.selection.left_out,
+            cached_bytes: self.store.cached_bytes(),
+            ..FramePlan::default()
+        };
+        for &i in &drawing.drawn {
+            let id = self.selection.picks[i].id;
+            if let Some(points) = self.store.points(id) {
+                plan.points += points.positions.len() as u64;
+                let points = Arc::clone(points);
+                plan.nodes.push(DrawNode { cloud: id.cloud, key: id.key, points });
+            }
+        }
+        let mut pieces = self.missing_pages();
+        plan.pages_loading = pieces.len() as u64;
+        for &i in &drawing.needed {
+            let pick = &self.selection.picks[i];
+            let before = pieces.len();
+            self.missing_groups(pick, &mut pieces);
+            if pieces.len() > before {
+                plan.left_out.loading.add(pick.node.points);
+            } else if self.presence(pick) == Presence::Lost {
+                plan.left_out.failed.add(pick.node.points);
+            }
+        }
+        let all_open =
+            self.trees.iter().zip(&self.clouds).all(|(tree, cloud)| tree.is_some() || cloud.failed);
+        plan.settled = self.view.is_some() && all_open && pieces.is_empty();
+        // Per cloud, so that a host which does not answer keeps nothing from the others.
+        let mut bytes = vec![0; self.clouds.len()];
+        pieces.retain(|piece| {
+            let bytes = &mut bytes[piece.id.node.cloud];
+            let fits = *bytes <= MAX_DEMAND_BYTES;
+            *bytes += piece.len;
+            fits
+        });
+
+        let counters = &self.shared.counters;
+        counters.cache_hits.add(moved.hits);
+        counters.evictions.add(moved.evicted);
+        counters.pinned_bytes.set(self.store.pinned_bytes());
+        counters.cached_bytes.set(self.store.cached_bytes());
+        self.sequence += 1;
+        plan.sequence = self.sequence;
+        self.shared.clock(|clock| clock.note(&plan));
+        self.shared.board.post(|news| news.plan = Arc::new(plan));
+        self.shared.loader.set_demand(Demand { pieces, seen });
+    }
+
+    fn presence(&self, pick: &Pick) -> Presence {
+        if self.store.points(pick.id).is_some() {
+            Presence::Drawable
+        } else if self.clouds[pick.id.cloud].failed
+            || self.store.is_lost(PieceId { node: pick.id, part: Part::Group(0) })
+        {
+            Presence::Lost
+        } else {
+            Presence::Absent
+        }
+    }
+
+    /// Wanted pages. They go before all payloads: they are small, and what lies below waits for
+    /// them.
+    fn missing_pages(&self) -> Vec<Piece> {
+        let pages = self.selection.pages.iter();
+        pages
+            .filter(|(cloud, _)| !self.clouds[*cloud].failed)
+            .filter_map(|(cloud, node)| Piece::page(*cloud, node))
+            .filter(|piece| !self.store.is_lost(piece.id))
+            .collect()
+    }
+
+    /// Adds the groups that a node still lacks.
+    fn missing_groups(&self, pick: &Pick, pieces: &mut Vec<Piece>) {
+        let cloud = self.clouds[pick.id.cloud];
+        let missing = cloud.groups & !self.store.groups(pick.id);
+        if missing == 0 || cloud.failed {
+            return;
+        }
+        let groups = (0..pick.node.payloads.len()).filter(|&g| missing & group_bit(g) != 0);
+        let found = groups.filter_map(|g| Piece::group(pick.id.cloud, &pick.node, g));
+        pieces.extend(found.filter(|piece| !self.store.is_lost(piece.id)));
+    }
+}

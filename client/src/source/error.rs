@@ -1,0 +1,38 @@
+//! Why a source did not deliver.
+
+/// Why bytes could not be had. Variants follow what a caller does next.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SourceError {
+    /// Trying again later may help: the host is busy, away, or broke off.
+    #[error("{place}: {message}")]
+    Transient {
+        /// The source, as [`Source::describe`](super::Source::describe) names it.
+        place: String,
+        /// What happened.
+        message: String,
+    },
+    /// Trying again cannot help; the message says what would.
+    #[error("{place}: {message}")]
+    Permanent {
+        /// The source, as [`Source::describe`](super::Source::describe) names it.
+        place: String,
+        /// What is wrong and what to do.
+        message: String,
+    },
+}
+
+impl SourceError {
+    /// Whether trying again later may help.
+    #[must_use]
+    pub const fn is_transient(&self) -> bool {
+        matches!(self, Self::Transient { .. })
+    }
+
+    pub(super) fn transient(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Transient { place: place.into(), message: message.into() }
+    }
+
+    pub(super) fn permanent(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Permanent { place: place.into(), message: message.into() }
+    }
+}

@@ -1,0 +1,146 @@
+//! Where datasets come from: sources of byte ranges.
+//!
+//! A [`Source`] is a local file or a URL on any host that answers range requests. Sources are
+//! asynchronous and do not retry: whoever reads decides what a failure costs, helped by
+//! [`SourceError::is_transient`] and [`Backoff`]. [`BlockingSource`] is the plain way for tools that
+//! read a dataset from front to back. Adding a kind of source means adding a file and an arm here;
+//! `tests/source_conformance.rs` holds all kinds to one behaviour.
+
+mod backoff;
+mod blocking;
+mod error;
+mod file;
+mod http;
+mod locator;
+
+use bytes::{Bytes, BytesMut};
+
+pub use backoff::Backoff;
+pub use blocking::BlockingSource;
+pub use error::SourceError;
+pub use file::FileSource;
+pub use http::{HttpSource, Timeouts};
+
+/// Most bytes that are reserved before any of them has arrived.
+const RESERVE_BYTES: u64 = 4 << 20;
+
+/// A source of byte ranges. Clones share connections and open files.
+///
+/// An HTTP source keeps connections alive on the runtime that it is first used in; use it (and its
+/// clones) in one runtime only.
+#[derive(Debug, Clone)]
+pub enum Source {
+    /// A URL.
+    Http(HttpSource),
+    /// A local file.
+    File(FileSource),
+}
+
+/// The first bytes of a dataset file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Prefix {
+    /// As many bytes as were asked for, or the whole file where it is shorter.
+    pub bytes: Bytes,
+    /// Length of the whole file in bytes, where the host tells.
+    pub total: Option<u64>,
+}
+
+impl Source {
+    /// Opens what a user names: a file, `http(s)://host/…/NAME.lods`, or a server's address with a
+    /// dataset's name (`http://host:8080/courtyard`, `127.0.0.1:8080/courtyard`).
+    ///
+    /// Files are opened at once; URLs are first asked when they are read.
+    ///
+    /// # Errors
+    /// [`SourceError::Permanent`] where the text names nothing that could be read.
+    pub fn parse(text: &str) -> Result<Self, SourceError> {
+        locator::parse(text)
+    }
+
+    /// The source for people: a path, or a URL without credentials and query.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Http(source) => source.describe(),
+            Self::File(source) => source.describe(),
+        }
+    }
+
+    /// Hands exactly `len` bytes from `offset` to `sink`, piece by piece as they arrive.
+    ///
+    /// Pieces that were handed out before an error are good.
+    ///
+    /// # Errors
+    /// [`SourceError`]: why the bytes could not be had, and whether trying again may help.
+    pub async fn stream_range(
+        &self,
+        offset: u64,
+        len: u64,
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<(), SourceError> {
+        match self {
+            _ if len == 0 => Ok(()),
+            Self::Http(source) => source.stream_range(offset, len, sink).await,
+            Self::File(source) => source.stream_range(offset, len, sink).await,
+        }
+    }
+
+    /// Exactly `len` bytes from `offset`.
+    ///
+    /// # Errors
+    /// As for [`stream_range`](Self::stream_range).
+    pub async fn read_range(&self, offset: u64, len: u64) -> Result<Bytes, SourceError> {
+        let mut joiner = Joiner::default();
+        self.stream_range(offset, len, &mut |piece| joiner.push(piece, len)).await?;
+        Ok(joiner.finish())
+    }
+
+    /// The first `len` bytes, or all where the file is shorter.
+    ///
+    /// # Errors
+    /// As for [`stream_range`](Self::stream_range).
+    pub async fn read_prefix(&self, len: u64) -> Result<Prefix, SourceError> {
+        match self {
+            Self::Http(source) => source.read_prefix(len).await,
+            Self::File(source) => source.read_prefix(len).await,
+        }
+    }
+
+    /// Length of the whole file in bytes; asks the host where no earlier answer has told.
+    ///
+    /// # Errors
+    /// As for [`stream_range`](Self::stream_range), and where the host does not tell.
+    pub async fn size(&self) -> Result<u64, SourceError> {
+        match self {
+            Self::Http(source) => source.size().await,
+            Self::File(source) => Ok(source.len()),
+        }
+    }
+}
+
+/// Joins pieces. A single one is passed on as it is.
+#[derive(Debug, Default)]
+struct Joiner {
+    first: Bytes,
+    joined: BytesMut,
+}
+
+impl Joiner {
+    /// Adds a piece of what is expected to become `len` bytes.
+    fn push(&mut self, piece: Bytes, len: u64) {
+        if self.first.is_empty() && self.joined.is_empty() {
+            self.first = piece;
+            return;
+        }
+        if self.joined.is_empty() {
+            // The length is the caller's wish: trust it for a few megabytes only.
+            self.joined.reserve(usize::try_from(len.min(RESERVE_BYTES)).unwrap_or(0));
+            self.joined.extend_from_slice(&std::mem::take(&mut self.first));
+        }
+        self.joined.extend_from_slice(&piece);
+    }
+
+    fn finish(self) -> Bytes {
+        if self.joined.is_empty() { self.first } else { self.joined.freeze() }
+    }
+}

@@ -1,0 +1,263 @@
+//! Hosts that misbehave: the engine ends settled on the same picture, or says why it cannot.
+
+use std::time::Duration;
+
+use lodestream_client::engine::{Engine, EngineConfig, EngineError};
+use tokio::sync::mpsc::unbounded_channel;
+
+use crate::{
+    common::{
+        dataset::{Recipe, dataset},
+        host::{Answer, Host, Request},
+    },
+    picture::{
+        LONG, away, config, expected, failure, http_source, overview, picture, source_with_patience,
+    },
+};
+
+/// Streams the dataset from a host with these manners; the picture must be that of the file.
+fn settles_on_the_same_picture(manners: impl FnMut(Request) -> Answer + Send + 'static) -> Engine {
+    settles_with_patience(LONG, manners)
+}
+
+fn settles_with_patience(
+    patience: Duration,
+    manners: impl FnMut(Request) -> Answer + Send + 'static,
+) -> Engine {
+    let recipe = Recipe::default();
+    let bytes = dataset(recipe);
+    let view = overview(recipe.corner);
+    let expected = expected(&bytes, &config(), view);
+    assert!(expected.len() > 50, "there is something to fetch");
+    let host = Host::start(bytes, manners);
+    let source = source_with_patience(&host, patience);
+    let engine = Engine::start(vec![source], config()).expect("starts");
+    engine.set_view(view);
+    let plan = engine.wait_settled(LONG).expect("settles");
+    assert_eq!(picture(&plan), expected);
+    assert!(engine.stats().problems.is_empty(), "{:?}", engine.stats().problems);
+    engine
+}
+
+#[test]
+fn a_good_host() {
+    let engine = settles_on_the_same_picture(|_| Answer::Good);
+    assert_eq!(engine.stats().since_start.totals.retries, 0);
+}
+
+#[test]
+fn every_third_request_fails() {
+    let engine = settles_on_the_same_picture(|request| match request.number % 3 {
+        2 => Answer::Status(500),
+        _ => Answer::Good,
+    });
+    assert!(engine.stats().since_start.totals.retries > 0);
+}
+
+#[test]
+fn bodies_are_cut_short() {
+    settles_on_the_same_picture(|request| match request.number % 2 {
+        0 => Answer::CutShort { share: 0.6 },
+        _ => Answer::Good,
+    });
+}
+
+#[test]
+fn long_bodies_are_always_cut_short_but_what_came_is_kept() {
+    let engine = settles_on_the_same_picture(|request| {
+        let (start, end) = request.range.unwrap_or_default();
+        if request.number > 0 && end - start > 8000 {
+            Answer::CutShort { share: 8000.0 / (end - start) as f64 }
+        } else {
+            Answer::Good
+        }
+    });
+    assert!(engine.stats().since_start.totals.retries > 0);
+}
+
+#[test]
+fn connections_close_without_an_answer() {
+    settles_on_the_same_picture(|request| match request.number % 4 {
+        1 => Answer::Close,
+        _ => Answer::Good,
+    });
+}
+
+#[test]
+fn answers_come_late_and_in_halves() {
+    settles_on_the_same_picture(|_| Answer::Late(Duration::from_millis(15)));
+}
+
+#[test]
+fn answers_hang_half_way() {
+    let (reached, _reached) = unbounded_channel();
+    settles_with_patience(Duration::from_millis(200), move |request| match request.number {
+        0 | 3 | 5 => Answer::Hang { share: 0.5, reached: reached.clone() },
+        _ => Answer::Good,
+    });
+}
+
+#[test]
+fn ranges_are_wrong_at_times() {
+    settles_on_the_same_picture(|request| match request.number % 3 {
+        0 => Answer::WrongRange,
+        _ => Answer::Good,
+    });
+}
+
+#[test]
+fn bytes_are_damaged_at_times() {
+    let engine = settles_on_the_same_picture(|request| match request.number {
+        2 | 4 => Answer::Garbage,
+        _ => Answer::Good,
+    });
+    assert!(engine.stats().since_start.totals.damaged > 0);
+}
+
+#[test]
+fn a_host_that_knew_ranges_forgets_them_at_times() {
+    settles_on_the_same_picture(|request| match request.number % 3 {
+        1 => Answer::WholeFile,
+        _ => Answer::Good,
+    });
+}
+
+#[test]
+fn a_host_killed_in_mid_stream_comes_back() {
+    let recipe = Recipe::default();
+    let bytes = dataset(recipe);
+    let views = [overview(recipe.corner), {
+        let mut near = overview(recipe.corner);
+        near.camera.eye = 0.5 * (near.camera.eye + near.camera.target);
+        near
+    }];
+    let expected = expected(&bytes, &config(), views[0]);
+    let (reached, mut hanging) = unbounded_channel();
+    let mut host = Host::start(bytes, move |request| match request.number {
+        0 => Answer::Good,
+        _ => Answer::Hang { share: 0.5, reached: reached.clone() },
+    });
+    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+    engine.set_view(views[0]);
+    hanging.blocking_recv().expect("an answer has begun");
+    host.stop();
+    // While the host is away, the caller goes on: none of these waits for it.
+    for round in 0..1000 {
+        engine.set_view(views[round % 2]);
+        assert!(!engine.plan().settled || engine.plan().points > 0);
+    }
+    assert!(matches!(
+        engine.wait_settled(Duration::from_millis(1)),
+        Err(EngineError::Timeout { .. })
+    ));
+    host.behave(|_| Answer::Good);
+    host.restart();
+    engine.set_view(views[0]);
+    let plan = engine.wait_settled(LONG).expect("settles once the host is back");
+    // The way here went through the other view, and nodes of the view before count more: look away
+    // and back, so that the picture is that of this view alone.
+    assert!(plan.points > 0);
+    engine.set_view(away(views[0]));
+    assert!(engine.wait_settled(LONG).expect("settles").nodes.is_empty(), "nothing to see there");
+    engine.set_view(views[0]);
+    let plan = engine.wait_settled(LONG).expect("settles");
+    assert_eq!(picture(&plan), expected);
+}
+
+#[test]
+fn a_host_that_is_not_there_yet_is_waited_for() {
+    let recipe = Recipe::default();
+    let mut host = Host::good(dataset(recipe));
+    host.stop();
+    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+    let message = loop {
+        let waited = engine.wait_open(Duration::from_millis(50));
+        let message = waited.expect_err("nobody there").to_string();
+        if !message.ends_with("not open") {
+            break message;
+        }
+    };
+    assert!(message.contains("1 of 1 sources are not open; http"), "{message}");
+    assert!(message.contains("no connection"), "{message}");
+    host.restart();
+    engine.set_view(overview(recipe.corner));
+    assert!(engine.wait_settled(LONG).expect("settles").points > 0);
+}
+
+#[test]
+fn a_host_that_ignores_ranges_is_named_as_such() {
+    let host = Host::start(dataset(Recipe::default()), |_| Answer::WholeFile);
+    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+    engine.set_view(overview([0.0; 3]));
+    assert!(failure(&engine).contains("status 200"));
+    assert_eq!(host.requests().len(), 1, "and is not asked again");
+}
+
+#[test]
+fn a_dataset_that_is_not_there_is_an_error() {
+    for (status, words) in [(404, "not found"), (403, "access denied")] {
+        let host = Host::start(vec![0; 100], move |_| Answer::Status(status));
+        let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+        let message = engine.wait_open(LONG).expect_err("failed").to_string();
+        assert!(message.contains(words) && message.contains("dataset.lods"), "{message}");
+    }
+}
+
+#[test]
+fn a_file_that_is_replaced_while_in_use_is_an_error() {
+    let recipe = Recipe::default();
+    let host = Host::start(dataset(recipe), |request| match request.number {
+        0 => Answer::Good,
+        _ => Answer::Tagged("\"second\""),
+    });
+    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+    engine.set_view(overview(recipe.corner));
+    assert!(failure(&engine).contains("replaced"));
+}
+
+#[test]
+fn what_is_no_dataset_is_an_error() {
+    let mut cut = dataset(Recipe::default());
+    cut.truncate(cut.len() - 10);
+    for (bytes, words) in [(vec![7; 5000], "not a lodestream dataset"), (cut, "cut short")] {
+        let host = Host::good(bytes);
+        let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+        let message = engine.wait_open(LONG).expect_err("failed").to_string();
+        assert!(message.contains(words), "{message}");
+    }
+}
+
+#[test]
+fn damaged_nodes_are_left_out_and_reported_and_the_rest_goes_on() {
+    let recipe = Recipe::default();
+    let mut bytes = dataset(recipe);
+    let config = EngineConfig { point_budget: u64::MAX, ..config() };
+    let whole = expected(&bytes, &config, overview(recipe.corner));
+    // In the middle of group 0, away from the root page.
+    let at = bytes.len() / 3;
+    bytes[at] ^= 0xff;
+    let host = Host::good(bytes);
+    let engine = Engine::start(vec![http_source(&host)], config).expect("starts");
+    engine.set_view(overview(recipe.corner));
+    let plan = engine.wait_settled(LONG).expect("settles");
+    let problems = engine.stats().problems;
+    assert_eq!(problems.len(), 1, "{problems:?}");
+    assert!(problems[0].contains("checksum") && problems[0].contains("left out"), "{problems:?}");
+    assert_eq!(plan.left_out.failed.nodes, 1);
+    let found = picture(&plan);
+    assert_eq!(found.len() + 1, whole.len());
+    assert!(found.iter().all(|(key, node)| whole.get(key) == Some(node)));
+}
+
+#[test]
+fn dropping_the_engine_does_not_wait_for_a_hanging_host() {
+    let (reached, mut hanging) = unbounded_channel();
+    let host = Host::start(dataset(Recipe::default()), move |_| Answer::Hang {
+        share: 0.1,
+        reached: reached.clone(),
+    });
+    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+    hanging.blocking_recv().expect("a request is in flight");
+    // Were the drop to wait for the request, or for those that would follow it, it would not return.
+    drop(engine);
+}
