@@ -5,10 +5,11 @@
 
 use std::{error::Error, fs, path::Path};
 
-use lodestream_fuzz::{BootInput, ColumnsInput, HierarchyInput, manifest};
+use lodestream_fuzz::{BootInput, ColumnsInput, HierarchyInput, leaf, manifest};
 use lodestream_protocol::{
-    Attribute, Dataset, Domain, HEADER_BYTES, LatticeBox, Node, NodeKey, Primitive, ReadAt,
-    ScalarType, Storage, decode_unchecked, encode_column, encode_positions, morton_encode,
+    Attribute, Boot, Dataset, Domain, HEADER_BYTES, HierarchyPage, Node, NodeKey, PageRef,
+    PayloadRef, Primitive, ReadAt, ScalarType, Storage, decode_unchecked, encode_column,
+    encode_positions, morton_encode,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -30,12 +31,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let manifest = dataset.manifest();
     let nodes = dataset.hierarchy()?;
     let groups = u8::try_from(manifest.groups.len())?;
-    let child = match nodes.iter().find_map(|node| node.child_page) {
-        Some(page) => dataset.source().read_at(page.offset, page.bytes as usize)?,
-        None => Vec::new(),
-    };
-    let input = HierarchyInput { groups, levels: manifest.levels, root: &root, child: &child };
+    let levels = manifest.levels;
+    let input = HierarchyInput { groups, levels, root: &root, child: &[] };
     fs::write(out.join("hierarchy/dataset"), input.to_bytes().ok_or("too large for a seed")?)?;
+    write_paged(&out.join("hierarchy/paged"))?;
 
     // The smallest nodes, one a level: small inputs are mutated best.
     for level in 0..manifest.levels {
@@ -74,6 +73,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_made(&out.join("columns/texture"), textured, Primitive::Rectangle, 32)
 }
 
+/// Writes a tree of two pages, which a small dataset never has.
+fn write_paged(path: &Path) -> Result<(), Box<dyn Error>> {
+    let lattice = manifest(32, 3, 1, Vec::new()).lattice;
+    let payload = PayloadRef { offset: 0, bytes: 100, crc: 1 };
+    let node = |key, child_mask| Node {
+        child_mask,
+        payloads: vec![payload],
+        normal_cone: Some([128, 128, 10]),
+        ..leaf(key, 50)
+    };
+    let children: Vec<NodeKey> = (0..2).filter_map(|octant| NodeKey::ROOT.child(octant)).collect();
+    let mut paged = node(children[1], 0b1000_0001);
+    let leaves: Vec<Node> = paged.children().map(|key| node(key, 0)).collect();
+    paged.child_page = Some(PageRef { offset: 300, bytes: 90, nodes: 2, crc: 0 });
+    let top = [node(NodeKey::ROOT, 0b11), node(children[0], 0), paged];
+    let root = HierarchyPage::encode(&top, vec![0], &lattice)?;
+    let child = HierarchyPage::encode(&leaves, vec![300], &lattice)?;
+    let input = HierarchyInput { groups: 1, levels: 3, root: &root, child: &child };
+    let boot = Boot::parse(&input.seal().ok_or("the seed cannot be sealed")?)?;
+    input.child_page_of(&boot, &boot.root_page.nodes[2]).ok_or("no child page")??;
+    Ok(fs::write(path, input.to_bytes().ok_or("too large for a seed")?)?)
+}
+
 fn attribute(name: &str, scalar: ScalarType, components: u8, domain: Domain) -> Attribute {
     let storage = Storage::Column { group: 0 };
     let (name, min, max) = (name.to_owned(), Vec::new(), Vec::new());
@@ -105,17 +127,7 @@ fn write_made(
     }
     let mut manifest = manifest(side_bits, 1, 1, attributes);
     manifest.primitive = primitive;
-    let node = Node {
-        key: NodeKey::ROOT,
-        child_mask: 0,
-        points: ELEMENTS,
-        bounds: LatticeBox { min: [0; 3], max: [0; 3] },
-        geometric_error: 0.0,
-        spacing: 0.0,
-        normal_cone: None,
-        payloads: Vec::new(),
-        child_page: None,
-    };
+    let node = leaf(NodeKey::ROOT, ELEMENTS);
     write_columns(path, &ColumnsInput { manifest, node, payload: &payload })
 }
 

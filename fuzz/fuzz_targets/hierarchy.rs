@@ -11,10 +11,7 @@ fuzz_target!(|data: &[u8]| {
     let Ok(boot) = Boot::parse(&sealed) else { return };
     check(&boot.root_page, &boot.manifest);
     for node in &boot.root_page.nodes {
-        let Some(page) = node.child_page else { continue };
-        let mut node = node.clone();
-        node.child_page = Some(lodestream_protocol::PageRef { crc: input.child_crc(), ..page });
-        if let Ok(children) = boot.parse_child_page(input.child, &node) {
+        if let Some(Ok(children)) = input.child_page_of(&boot, node) {
             check(&children, &boot.manifest);
         }
     }

@@ -1,10 +1,10 @@
 //! Input of the target `columns`.
 
 use lodestream_protocol::{
-    Attribute, Domain, LatticeBox, Manifest, Node, NodeKey, Primitive, ScalarType, Storage,
+    Attribute, Domain, Manifest, Node, NodeKey, Primitive, ScalarType, Storage,
 };
 
-use crate::manifest;
+use crate::{leaf, manifest};
 
 const SCALARS: [ScalarType; 10] = [
     ScalarType::U8,
@@ -78,17 +78,8 @@ impl<'a> ColumnsInput<'a> {
             manifest.primitive = Primitive::Rectangle;
         }
         manifest.to_json().ok()?;
-        let node = Node {
-            key: NodeKey::new(level, [0; 3])?,
-            child_mask: 0,
-            points: u32::from_le_bytes([p0, p1, p2, 0]) % MAX_POINTS,
-            bounds: LatticeBox { min: [0; 3], max: [0; 3] },
-            geometric_error: 0.0,
-            spacing: 0.0,
-            normal_cone: None,
-            payloads: Vec::new(),
-            child_page: None,
-        };
+        let points = u32::from_le_bytes([p0, p1, p2, 0]) % MAX_POINTS;
+        let node = leaf(NodeKey::new(level, [0; 3])?, points);
         Some(Self { manifest, node, payload })
     }
 

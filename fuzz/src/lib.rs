@@ -10,7 +10,8 @@ pub use columns::ColumnsInput;
 pub use pages::{BootInput, HierarchyInput};
 
 use lodestream_protocol::{
-    Attribute, GroupInfo, Lattice, LatticeBox, Manifest, Method, Primitive, Refinement,
+    Attribute, GroupInfo, Lattice, LatticeBox, Manifest, Method, Node, NodeKey, Primitive,
+    Refinement,
 };
 
 /// A manifest with the given parts and nothing remarkable about the rest.
@@ -31,6 +32,22 @@ pub fn manifest(side_bits: u8, levels: u8, groups: usize, attributes: Vec<Attrib
         groups: (0..groups).map(|i| GroupInfo { name: i.to_string(), bytes: 0 }).collect(),
         crs: None,
         sources: Vec::new(),
+    }
+}
+
+/// A leaf with the given key and elements and nothing remarkable about the rest.
+#[must_use]
+pub fn leaf(key: NodeKey, points: u32) -> Node {
+    Node {
+        key,
+        child_mask: 0,
+        points,
+        bounds: LatticeBox { min: [0; 3], max: [0; 3] },
+        geometric_error: 0.0,
+        spacing: 0.0,
+        normal_cone: None,
+        payloads: Vec::new(),
+        child_page: None,
     }
 }
 

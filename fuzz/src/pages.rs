@@ -1,6 +1,8 @@
 //! Inputs of the targets `boot` and `hierarchy`.
 
-use lodestream_protocol::{Boot, HEADER_BYTES, Header, Manifest};
+use lodestream_protocol::{
+    Boot, HEADER_BYTES, Header, HierarchyPage, Manifest, Node, PageRef, Result,
+};
 
 use crate::{join_counted, manifest, split_counted};
 
@@ -89,9 +91,11 @@ impl<'a> HierarchyInput<'a> {
         Boot::encode(&self.manifest(), self.root, 0, u64::MAX >> 1).ok()
     }
 
-    /// The checksum by which a node would name the child page.
+    /// Reads the child page as that of `node`; `None` where the node names none.
     #[must_use]
-    pub fn child_crc(&self) -> u32 {
-        crc32fast::hash(self.child)
+    pub fn child_page_of(&self, boot: &Boot, node: &Node) -> Option<Result<HierarchyPage>> {
+        let page = PageRef { crc: crc32fast::hash(self.child), ..node.child_page? };
+        let node = Node { child_page: Some(page), ..node.clone() };
+        Some(boot.parse_child_page(self.child, &node))
     }
 }
