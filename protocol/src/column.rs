@@ -458,3 +458,66 @@ fn count_texels(attribute: &Attribute, sizes: &[u8]) -> Result<usize> {
     }
     Ok(texels as usize)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attribute::Storage;
+    use proptest::prelude::*;
+
+    fn scalars() -> impl Strategy<Value = ScalarType> {
+        use ScalarType::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
+        prop::sample::select(vec![U8, I8, U16, I16, U32, I32, U64, I64, F32, F64])
+    }
+
+    proptest! {
+        #[test]
+        fn columns_of_any_bits_read_back(
+            scalar in scalars(), components in 1u8..5, bytes in prop::collection::vec(any::<u8>(), 0..4000),
+            narrow in any::<bool>(),
+        ) {
+            let attribute = Attribute {
+                name: "a".into(), scalar, components, domain: Domain::Element,
+                storage: Storage::Column { group: 0 }, min: vec![], max: vec![],
+            };
+            let len = attribute.value_bytes();
+            let count = bytes.len() / len;
+            let mut values = bytes[..count * len].to_vec();
+            if narrow {
+                values.iter_mut().for_each(|v| *v &= 3);
+            }
+            let mut column = Vec::new();
+            encode_column(&mut column, &attribute, &values)?;
+            let back = decode_column(&mut &column[..], &attribute, count)?;
+            prop_assert_eq!(back, values);
+        }
+
+        #[test]
+        fn positions_of_any_width_read_back(
+            bits in 0u8..=32, mut points in prop::collection::vec(any::<[u32; 3]>(), 1..600),
+        ) {
+            let mask = ((1u64 << bits) - 1) as u32;
+            points.iter_mut().flatten().for_each(|c| *c &= mask);
+            points.sort_by_key(|&q| u128::encode(q));
+            let mut column = Vec::new();
+            if bits <= 21 {
+                let codes: Vec<u64> = points.iter().map(|&q| u64::encode(q)).collect();
+                encode_positions(&mut column, &codes, bits)?;
+            } else {
+                let codes: Vec<u128> = points.iter().map(|&q| u128::encode(q)).collect();
+                encode_positions(&mut column, &codes, bits)?;
+            }
+            prop_assert_eq!(decode_positions(&mut &column[..], points.len(), bits)?, points);
+        }
+
+        #[test]
+        fn garbage_never_panics(bytes in prop::collection::vec(any::<u8>(), 0..300), count in 0usize..1000) {
+            let attribute = Attribute {
+                name: "a".into(), scalar: ScalarType::U16, components: 3, domain: Domain::Element,
+                storage: Storage::Column { group: 0 }, min: vec![], max: vec![],
+            };
+            let _ = decode_column(&mut &bytes[..], &attribute, count);
+            let _ = decode_positions(&mut &bytes[..], count, 13);
+        }
+    }
+}

@@ -169,8 +169,14 @@ impl Manifest {
                 }
                 _ => {}
             }
-            if attribute.domain == Domain::Texel && self.primitive != Primitive::Rectangle {
-                return bad(format!("attribute {name} has texels but there are no textures"));
+            if attribute.domain == Domain::Texel {
+                // The number of texels must be known before texels are decoded.
+                let sizes = self.attributes[..i].iter().find(|a| a.name == "texture_size");
+                if sizes.is_none_or(|sizes| sizes.group() != attribute.group()) {
+                    return bad(format!(
+                        "texels of {name} must follow texture_size in the same column group"
+                    ));
+                }
             }
         }
         for &(name, components) in self.primitive.required_attributes() {

@@ -1,0 +1,226 @@
+//! The format held still: tiny datasets of every primitive and both refinements, byte for byte.
+//!
+//! `LODESTREAM_WRITE_GOLDEN=1 cargo test -p lodestream-protocol` writes the files anew, which is only
+//! right together with a new format version.
+
+use std::path::PathBuf;
+
+use lodestream_protocol::{
+    Attribute, Boot, Dataset, Domain, Error, GroupInfo, HierarchyPage, Lattice, LatticeBox,
+    Manifest, Method, Node, NodeKey, PageRef, PayloadRef, Primitive, Refinement, ScalarType,
+    SourceInfo, Storage, encode_column, encode_positions, morton_encode,
+};
+
+fn attribute(name: &str, scalar: ScalarType, components: u8, group: usize) -> Attribute {
+    Attribute {
+        name: name.into(),
+        scalar,
+        components,
+        domain: if name.starts_with("texel_") { Domain::Texel } else { Domain::Element },
+        storage: Storage::Column { group },
+        min: vec![],
+        max: vec![],
+    }
+}
+
+fn f32s(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+/// Attributes and, for the root's two elements and its child's one, their values.
+fn elements(primitive: Primitive) -> Vec<(Attribute, [Vec<u8>; 2])> {
+    use ScalarType::{F32, U8, U16};
+    let axes = || {
+        [
+            (
+                attribute("axis_u", F32, 3, 0),
+                [f32s(&[1.0, 0.0, 0.0, 0.5, 0.0, 0.0]), f32s(&[0.25, 0.0, 0.0])],
+            ),
+            (
+                attribute("axis_v", F32, 3, 0),
+                [f32s(&[0.0, 2.0, 0.0, 0.0, 0.75, 0.0]), f32s(&[0.0, 0.0, 0.125])],
+            ),
+        ]
+    };
+    let mut all = vec![(attribute("color", U8, 3, 0), [vec![255, 128, 0, 1, 2, 3], vec![9, 8, 7]])];
+    match primitive {
+        Primitive::Point => all
+            .push((attribute("intensity", U16, 1, 1), [vec![0x34, 0x12, 0xff, 0xff], vec![7, 0]])),
+        Primitive::Disc => {
+            all.push((
+                attribute("normal", F32, 3, 1),
+                [f32s(&[0.0, 0.0, 1.0, 1.0, 0.0, 0.0]), f32s(&[0.0, 1.0, 0.0])],
+            ));
+            all.push((attribute("radius", F32, 1, 0), [f32s(&[0.5, 0.75]), f32s(&[0.25])]));
+        }
+        Primitive::Ellipse => all.extend(axes()),
+        Primitive::Rectangle => {
+            all.extend(axes());
+            // 2 x 1 and 1 x 2 texels; then 1 x 1.
+            all.push((
+                attribute("texture_size", U16, 2, 0),
+                [vec![2, 0, 1, 0, 1, 0, 2, 0], vec![1, 0, 1, 0]],
+            ));
+            all.push((
+                attribute("texel_color", U8, 4, 0),
+                [(0..16).collect(), vec![200, 100, 50, 255]],
+            ));
+        }
+    }
+    all
+}
+
+/// A root with two elements and, in a page of its own, one child with one element.
+fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
+    let elements = elements(primitive);
+    let attributes: Vec<Attribute> = elements.iter().map(|(a, _)| a.clone()).collect();
+    let groups = 1 + attributes.iter().filter_map(Attribute::group).max().unwrap_or(0);
+    let lattice =
+        Lattice { scale: 0.01, offset: [1000.0, 2000.0, -5.0], origin: [7, -8, 9], side_bits: 4 };
+    let positions = [vec![[0, 1, 2], [15, 15, 15]], vec![[3, 0, 7]]];
+    let keys = [NodeKey::ROOT, NodeKey::ROOT.child(5).expect("octant")];
+    let mut payloads: Vec<Vec<Vec<u8>>> = Vec::new();
+    for (n, positions) in positions.iter().enumerate() {
+        let mut node = vec![Vec::new(); groups];
+        let codes: Vec<u64> = positions.iter().map(|&q| morton_encode(q)).collect();
+        encode_positions(&mut node[0], &codes, lattice.node_bits(n as u8)).expect("encodes");
+        for (attribute, values) in &elements {
+            let group = attribute.group().expect("a column");
+            encode_column(&mut node[group], attribute, &values[n]).expect("encodes");
+        }
+        payloads.push(node);
+    }
+    let mut manifest = Manifest {
+        generator: "golden".into(),
+        points: 3,
+        nodes: 2,
+        levels: 2,
+        refinement,
+        primitive,
+        method: Method { name: "golden".into(), grid: 128, leaf_capacity: 2 },
+        lattice,
+        bounds: LatticeBox { min: [0, 0, 2], max: [15, 15, 15] },
+        largest_rounding: 0.0,
+        attributes,
+        groups: vec![],
+        crs: None,
+        sources: vec![SourceInfo { name: "golden.las".into(), points: 3 }],
+    };
+    for group in 0..groups {
+        let name = if group == 0 { "base".into() } else { format!("group{group}") };
+        let bytes = payloads.iter().map(|p| p[group].len() as u64).sum();
+        manifest.groups.push(GroupInfo { name, bytes });
+    }
+    // Offsets from the end of the index: group by group, root before child.
+    let mut offset = 0;
+    let mut offsets = [Vec::new(), Vec::new()];
+    for group in 0..groups {
+        for (node, offsets) in offsets.iter_mut().enumerate() {
+            offsets.push(offset);
+            offset += payloads[node][group].len() as u64;
+        }
+    }
+    let node = |n: usize, child_mask: u8, bounds: LatticeBox| Node {
+        key: keys[n],
+        child_mask,
+        points: positions[n].len() as u32,
+        bounds,
+        geometric_error: if n == 0 { 0.5 } else { 0.0 },
+        spacing: 0.25,
+        normal_cone: (primitive == Primitive::Disc).then_some([128, 127, 30]),
+        payloads: payloads[n]
+            .iter()
+            .map(|p| PayloadRef { offset: 0, bytes: p.len() as u32, crc: crc32fast::hash(p) })
+            .collect(),
+        child_page: None,
+    };
+    let child = node(1, 0, LatticeBox { min: [11, 0, 15], max: [11, 0, 15] });
+    let child_page =
+        HierarchyPage::encode(&[child], offsets[1].clone(), &lattice).expect("encodes");
+    let mut root = node(0, 1 << 5, manifest.bounds);
+    root.child_page = Some(PageRef {
+        offset,
+        bytes: child_page.len() as u32,
+        nodes: 1,
+        crc: crc32fast::hash(&child_page),
+    });
+    let root_page = HierarchyPage::encode(&[root], offsets[0].clone(), &lattice).expect("encodes");
+    let top = payloads[0][0].len() as u64;
+    let tail = offset + child_page.len() as u64;
+    let mut file = Boot::encode(&manifest, &root_page, top, tail).expect("encodes");
+    for group in 0..groups {
+        payloads.iter().for_each(|p| file.extend_from_slice(&p[group]));
+    }
+    file.extend_from_slice(&child_page);
+    file
+}
+
+const KINDS: [(&str, Primitive, Refinement); 8] = [
+    ("point-additive", Primitive::Point, Refinement::Additive),
+    ("point-replace", Primitive::Point, Refinement::Replace),
+    ("disc-additive", Primitive::Disc, Refinement::Additive),
+    ("disc-replace", Primitive::Disc, Refinement::Replace),
+    ("ellipse-additive", Primitive::Ellipse, Refinement::Additive),
+    ("ellipse-replace", Primitive::Ellipse, Refinement::Replace),
+    ("rectangle-additive", Primitive::Rectangle, Refinement::Additive),
+    ("rectangle-replace", Primitive::Rectangle, Refinement::Replace),
+];
+
+#[test]
+fn every_primitive_and_refinement_keeps_its_bytes() {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
+    for (name, primitive, refinement) in KINDS {
+        let bytes = dataset(primitive, refinement);
+        let path = folder.join(format!("{name}.lods"));
+        if std::env::var_os("LODESTREAM_WRITE_GOLDEN").is_some() {
+            std::fs::create_dir_all(&folder).expect("folder");
+            std::fs::write(&path, &bytes).expect("writes");
+        }
+        let golden = std::fs::read(&path).expect("golden file is committed");
+        assert!(golden == bytes, "{name}: the encoder no longer writes the golden bytes");
+    }
+}
+
+#[test]
+fn every_primitive_and_refinement_reads_back() {
+    for (name, primitive, refinement) in KINDS {
+        let dataset = Dataset::open(dataset(primitive, refinement)).expect(name);
+        assert_eq!(dataset.manifest().primitive, primitive);
+        assert_eq!(dataset.manifest().refinement, refinement);
+        let nodes = dataset.hierarchy().expect(name);
+        assert_eq!(nodes[1].key.to_string(), "1/1/0/1");
+        let groups: Vec<usize> = (0..dataset.manifest().groups.len()).collect();
+        for (n, node) in nodes.iter().enumerate() {
+            let points = dataset.read_node(node, &groups).expect(name);
+            assert_eq!(points.positions.len(), 2 - n);
+            for (index, (_, values)) in elements(primitive).iter().enumerate() {
+                let column = points.column(index).expect("read");
+                assert_eq!(column.bytes, values[n], "{name} attribute {index}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_cut_is_refused() {
+    let whole = dataset(Primitive::Rectangle, Refinement::Replace);
+    for len in 0..whole.len() {
+        let error = Dataset::open(whole[..len].to_vec()).expect_err("refused");
+        assert!(matches!(error, Error::Truncated { .. }), "{len}: {error}");
+    }
+}
+
+#[test]
+fn every_flipped_bit_is_found() {
+    let whole = dataset(Primitive::Disc, Refinement::Replace);
+    for bit in 0..8 * whole.len() {
+        let mut bytes = whole.clone();
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        let read_all = || {
+            let dataset = Dataset::open(bytes)?;
+            let nodes = dataset.hierarchy()?;
+            nodes.iter().try_for_each(|node| dataset.read_node(node, &[0, 1]).map(|_| ()))
+        };
+        assert!(read_all().is_err(), "bit {bit} was flipped and nobody noticed");
+    }
+}
