@@ -1,0 +1,81 @@
+//! One dataset file, opened for one request.
+
+use std::{
+    fs::{File, OpenOptions},
+    io,
+    path::PathBuf,
+    time::SystemTime,
+};
+
+use lodestream_preprocess::FileSource;
+use lodestream_protocol::{Error as FormatError, HEADER_BYTES, Header};
+
+use crate::conditional::{Validators, http_date};
+
+/// An open file whose header is sound and which is as long as its header says.
+#[derive(Debug)]
+pub(crate) struct DatasetFile {
+    pub(crate) path: PathBuf,
+    pub(crate) source: FileSource,
+    /// Length of the dataset in bytes; what the file may hold beyond it is not served.
+    pub(crate) bytes: u64,
+    pub(crate) validators: Validators,
+}
+
+/// Why a dataset file cannot be served.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum OpenError {
+    /// There is no such file.
+    Missing,
+    /// It is there, but no sound dataset (yet): the reason.
+    Unreadable(String),
+}
+
+impl DatasetFile {
+    /// Opens the file and looks at its header.
+    pub(crate) fn open(path: PathBuf) -> Result<Self, OpenError> {
+        let file = open_regular(&path)?;
+        let modified = file.metadata().and_then(|m| m.modified());
+        let source = FileSource::from(file);
+        let mut head = [0; HEADER_BYTES];
+        let read = source.read_into(&mut head, 0).map_err(unreadable)?;
+        let header = Header::parse(&head[..read]).map_err(unreadable)?;
+        let length = source.file().metadata().map_err(unreadable)?.len();
+        if length < header.file_bytes {
+            return Err(unreadable(FormatError::Truncated {
+                what: "dataset",
+                needed: header.file_bytes,
+                available: length,
+            }));
+        }
+        let validators = Validators {
+            etag: format!("\"{}\"", header.content_id_hex()),
+            modified: modified.ok().and_then(|m| http_date(m, SystemTime::now())),
+        };
+        Ok(Self { path, source, bytes: header.file_bytes, validators })
+    }
+}
+
+/// Opens a regular file; never waits for the other end of a pipe.
+pub(crate) fn open_regular(path: &PathBuf) -> Result<File, OpenError> {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        options.custom_flags(rustix::fs::OFlags::NONBLOCK.bits().cast_signed());
+    }
+    let file = options.open(path).map_err(|e| match e.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::InvalidFilename => OpenError::Missing,
+        _ => unreadable(e),
+    })?;
+    match file.metadata() {
+        Ok(metadata) if metadata.is_file() => Ok(file),
+        Ok(_) => Err(OpenError::Missing),
+        Err(e) => Err(unreadable(e)),
+    }
+}
+
+fn unreadable(reason: impl std::fmt::Display) -> OpenError {
+    OpenError::Unreadable(reason.to_string())
+}
