@@ -1,6 +1,8 @@
-//! lodestream: client.
+//! The client: sources, the streaming engine, renderers, and the commands of `lodestream`.
 
 pub mod camera;
+pub mod commands;
 pub mod engine;
+pub mod painter;
 pub mod render;
 pub mod source;

@@ -1,2 +1,34 @@
-//! lodestream.
-fn main() {}
+//! `lodestream`: the whole toolbox.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use lodestream_client::commands::{demo, inspect};
+use lodestream_server::commands::{build, finish, serve, verify};
+
+/// Stream point clouds of any size: build, host, look, measure
+#[derive(Debug, Parser)]
+#[command(name = "lodestream", version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Build(build::BuildArgs),
+    Inspect(inspect::InspectArgs),
+    Verify(verify::VerifyArgs),
+    Serve(serve::ServeArgs),
+    Demo(demo::DemoArgs),
+}
+
+fn main() -> ExitCode {
+    finish(match Cli::parse().command {
+        Command::Build(args) => build::run(args),
+        Command::Inspect(args) => inspect::run(args),
+        Command::Verify(args) => verify::run(args),
+        Command::Serve(args) => serve::run(args),
+        Command::Demo(args) => demo::run(args),
+    })
+}

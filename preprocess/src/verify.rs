@@ -397,7 +397,6 @@ fn compare(
 
     let mut inputs_print = Fingerprint::default();
     for (index, input) in opened.into_iter().enumerate() {
-        let path = input.info.path.clone();
         let map = RowMap::new(&input.info.attributes, &schema);
         // One input at a time goes through the store that the build uses, held in memory: its
         // lattice placement may only be known once all of it has been read.
