@@ -1,1 +1,7 @@
-//! lodestream: end-to-end tests.
+//! What the end-to-end tests and the benches share.
+
+mod measure;
+mod program;
+
+pub use measure::{Options, median};
+pub use program::program;

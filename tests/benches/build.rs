@@ -18,6 +18,7 @@ use std::{
 
 use laz::ParLasZipDecompressor;
 use lodestream_protocol::Boot;
+use lodestream_tests::{Options, median, program};
 use wait4::Wait4;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -26,14 +27,11 @@ const RIVAL_VARIABLE: &str = "LODESTREAM_POTREE_CONVERTER";
 const DEFAULT_SCAN: &str = "sim:courtyard?points=10M&seed=1";
 
 fn main() -> Result<()> {
-    let Options { input, runs } = Options::parse()?;
+    let Options { input, runs } = Options::parse(DEFAULT_SCAN)?;
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bench_build");
     fs::create_dir_all(&folder)?;
-    let ours = beside_this_bench("lodestream")?;
-    let input = match input {
-        Some(input) => input,
-        None => simulated_las(&ours, &folder)?,
-    };
+    let ours = program("lodestream")?;
+    let input = if input == DEFAULT_SCAN { simulated_las(&ours, &folder)? } else { input.into() };
 
     let dataset = folder.join("ours.lods");
     let rival_folder = folder.join("rival");
@@ -87,34 +85,6 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The command line.
-struct Options {
-    input: Option<PathBuf>,
-    runs: usize,
-}
-
-impl Options {
-    fn parse() -> Result<Self> {
-        let mut options = Self { input: None, runs: 5 };
-        let mut arguments = env::args_os().skip(1);
-        while let Some(argument) = arguments.next() {
-            match argument.to_str() {
-                // cargo says so to every bench.
-                Some("--bench") => {}
-                Some("--runs") => {
-                    let runs = arguments.next().ok_or("--runs needs a number")?;
-                    options.runs = runs.to_str().ok_or("--runs needs a number")?.parse()?;
-                }
-                _ => options.input = Some(argument.into()),
-            }
-        }
-        if options.runs == 0 {
-            return Err("--runs must be at least 1".into());
-        }
-        Ok(options)
-    }
-}
-
 /// What one run took.
 struct Run {
     seconds: f64,
@@ -165,24 +135,6 @@ impl Summary {
             "| {name} | {median:.2} | {min:.2} | {max:.2} | {peak_mib:.0} | {bytes_per_point:.2} |"
         );
     }
-}
-
-/// Sorts `values`, of which there is at least one, and returns the middle one.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
-}
-
-/// `target/release/NAME`, where this bench is `target/release/deps/build-…`.
-fn beside_this_bench(name: &str) -> Result<PathBuf> {
-    let bench = env::current_exe()?;
-    let folder = bench.ancestors().nth(2).ok_or("the bench lies outside of a target folder")?;
-    let binary = folder.join(name).with_extension(env::consts::EXE_EXTENSION);
-    if !binary.exists() {
-        return Err(format!("{}: not built; run ./dev bench build", binary.display()).into());
-    }
-    Ok(binary)
 }
 
 /// The default input, through our own dataset, which keeps every point.
