@@ -264,10 +264,19 @@ fn build_in_pool(
         }
     }
     let announced: Option<u64> = opened.iter().map(|i| i.info.points).sum();
+    check_disk(&opened, config, folder)?;
     phases.begin("read", announced.unwrap_or(0), "points");
     let read = read_all(config, opened, folder, &check, progress, &mut warnings)?;
     let points: u64 = read.writer.points.iter().sum();
     let points_per_input = read.writer.points.clone();
+    if points == 0 {
+        let dropped: u64 = read.dropped.iter().map(|d| d.points).sum();
+        let reasons: Vec<&str> = read.dropped.iter().map(|d| d.reason.as_str()).collect();
+        return Err(Error::Setup(match dropped {
+            0 => format!("{}: no points, so there is nothing to build", read.names.join(", ")),
+            _ => format!("all {dropped} points are unusable: {}", reasons.join("; ")),
+        }));
+    }
 
     phases.begin("plan", points, "points");
     let coordinates: Vec<InputCoordinates> = read
@@ -433,6 +442,36 @@ fn check_output(output: &Path, folder: &Path) -> Result<()> {
         )));
     }
     tempfile::tempfile_in(folder).map_err(Error::io(folder, "cannot create files here"))?;
+    Ok(())
+}
+
+/// Refuses before any work what the disk surely has no room for: the temporary files, where the points
+/// do not fit the memory, and a quarter of the raw points as the dataset.
+fn check_disk(opened: &[OpenedInput], config: &BuildConfig, folder: &Path) -> Result<()> {
+    let raw: u64 = opened
+        .iter()
+        .map(|input| {
+            let row = Schema::new(input.info.attributes.clone()).row_bytes as u64;
+            let position = match input.info.coordinates {
+                CoordinateKind::Scaled { .. } => 12,
+                CoordinateKind::Float { .. } => 24,
+            };
+            input.info.points.unwrap_or(0).saturating_mul(position + row)
+        })
+        .fold(0, u64::saturating_add);
+    let temporary = if raw > config.memory_bytes / 2 { raw.saturating_mul(2) } else { 0 };
+    let needed = temporary.saturating_add(raw / 4);
+    // Where the system does not tell, the build finds out.
+    let Ok(free) = fs4::available_space(folder) else { return Ok(()) };
+    if free < needed {
+        return Err(Error::Setup(format!(
+            "{}: the build needs about {} MiB of disk, {} MiB are free; choose another place for the \
+             output or raise --memory",
+            folder.display(),
+            needed >> 20,
+            free >> 20
+        )));
+    }
     Ok(())
 }
 
