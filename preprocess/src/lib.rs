@@ -26,6 +26,7 @@ pub mod sim;
 mod store;
 mod tree;
 mod verify;
+pub mod writers;
 
 pub use build::{
     BuildConfig, BuildReport, ColumnBytes, Dropped, Method, PhaseSeconds, Progress, build,

@@ -27,7 +27,7 @@ mod ordered;
 pub(crate) mod point_format;
 mod records;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod transcode;
 
 use std::path::Path;

@@ -3,7 +3,7 @@
 mod damage;
 mod formats;
 mod records;
-pub(super) mod scan;
+pub(crate) mod scan;
 
 use std::path::Path;
 
@@ -15,15 +15,15 @@ use crate::{
 
 /// Everything that a file gives.
 #[derive(Debug, PartialEq)]
-struct Contents {
-    info: InputInfo,
-    positions: Vec<[i32; 3]>,
-    rows: Vec<u8>,
-    report: ReadReport,
+pub(crate) struct Contents {
+    pub(crate) info: InputInfo,
+    pub(crate) positions: Vec<[i32; 3]>,
+    pub(crate) rows: Vec<u8>,
+    pub(crate) report: ReadReport,
 }
 
 impl Contents {
-    fn read(path: &Path) -> Result<Self> {
+    pub(crate) fn read(path: &Path) -> Result<Self> {
         let reader = open(path)?;
         let info = reader.info().clone();
         let (mut positions, mut rows) = (Vec::new(), Vec::new());
@@ -47,7 +47,7 @@ impl Contents {
     }
 
     /// The values of one attribute, point after point.
-    fn values(&self, name: &str) -> Vec<u8> {
+    pub(crate) fn values(&self, name: &str) -> Vec<u8> {
         let mut at = 0;
         for attribute in &self.info.attributes {
             let size = attribute.scalar.size_bytes() * usize::from(attribute.components);
