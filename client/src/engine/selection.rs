@@ -407,6 +407,9 @@ mod tests {
     /// The cube is 256 world units wide.
     const LATTICE: Lattice = Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits: 8 };
 
+    /// Of a tree with many nodes.
+    const SEED: u64 = 5;
+
     /// A random tree of four levels with pages of two, and all of its pages.
     struct Forest {
         boot: Arc<Boot>,
@@ -418,24 +421,32 @@ mod tests {
             let mut rng = fastrand::Rng::with_seed(seed);
             let mut pages = HashMap::new();
             let mut root_page = Vec::new();
-            let mut open = vec![(NodeKey::ROOT, None)];
-            while let Some((key, page)) = open.pop() {
+            let whole = LatticeBox { min: [0; 3], max: [255; 3] };
+            let mut open = vec![(NodeKey::ROOT, whole, None)];
+            while let Some((key, within, page)) = open.pop() {
+                let bounds = random_box(within, &mut rng);
                 let child_mask = if key.level() == 3 { 0 } else { rng.u8(..) };
-                let paged = key.level() == 1 && child_mask != 0;
-                let reference = PageRef { offset: 0, bytes: 1, nodes: 1, crc: 0 };
-                let node = Node {
+                let mut node = Node {
                     key,
                     child_mask,
                     points: rng.u32(1..1000),
-                    bounds: bounds(key),
+                    bounds,
                     geometric_error: 0.0,
                     spacing: 0.0,
                     normal_cone: None,
                     payloads: vec![],
-                    child_page: paged.then_some(reference),
+                    child_page: None,
                 };
-                let below = if paged { Some(key) } else { page };
-                open.extend(node.children().map(|child| (child, below)));
+                let below: Vec<_> = node
+                    .children()
+                    .filter_map(|child| Some((child, overlap(cube(child), bounds)?)))
+                    .collect();
+                node.child_mask = below.iter().fold(0, |mask, (c, _)| mask | 1 << c.octant());
+                if key.level() == 1 && !node.is_leaf() {
+                    node.child_page = Some(PageRef { offset: 0, bytes: 1, nodes: 1, crc: 0 });
+                }
+                let below_page = if node.child_page.is_some() { Some(key) } else { page };
+                open.extend(below.into_iter().map(|(child, within)| (child, within, below_page)));
                 match page {
                     None => root_page.push(node),
                     Some(page) => {
@@ -465,10 +476,28 @@ mod tests {
         }
     }
 
-    fn bounds(key: NodeKey) -> LatticeBox {
+    fn cube(key: NodeKey) -> LatticeBox {
         let min = LATTICE.node_min(key);
         let last = (1 << LATTICE.node_bits(key.level())) - 1;
         LatticeBox { min, max: min.map(|c| c + last) }
+    }
+
+    fn overlap(a: LatticeBox, b: LatticeBox) -> Option<LatticeBox> {
+        let min: [u32; 3] = std::array::from_fn(|i| a.min[i].max(b.min[i]));
+        let max: [u32; 3] = std::array::from_fn(|i| a.max[i].min(b.max[i]));
+        (0..3).all(|i| min[i] <= max[i]).then_some(LatticeBox { min, max })
+    }
+
+    /// Bounds inside those of the parent, often flat or long: then a child can be more important
+    /// than its parent.
+    fn random_box(mut within: LatticeBox, rng: &mut fastrand::Rng) -> LatticeBox {
+        for axis in 0..3 {
+            if rng.u8(0..3) == 0 {
+                within.min[axis] = rng.u32(within.min[axis]..=within.max[axis]);
+                within.max[axis] = rng.u32(within.min[axis]..=within.max[axis]);
+            }
+        }
+        within
     }
 
     fn manifest(refinement: Refinement) -> Manifest {
@@ -490,8 +519,8 @@ mod tests {
         }
     }
 
-    fn optics(eye: [f64; 3], target: [f64; 3]) -> Optics {
-        let projection = Projection::Perspective { fov_y: 1.0 };
+    fn optics(eye: [f64; 3], target: [f64; 3], fov_y: f64) -> Optics {
+        let projection = Projection::Perspective { fov_y };
         let camera = Camera { eye: eye.into(), target: target.into(), up: DVec3::Z, projection };
         Optics::new(&View { camera, size_px: [640, 480] })
     }
@@ -512,11 +541,11 @@ mod tests {
         #[test]
         fn loading_only_the_pages_asked_for_ends_with_the_selection_of_the_whole_tree(
             seed in any::<u64>(), refinement in refinements(), eye in place(), target in place(),
-            point_budget in 0u64..50_000, min_size_px in 1.0..100.0,
+            fov_y in 0.1..3.1, point_budget in 0u64..50_000, min_size_px in 1.0..100.0,
             first in prop::collection::vec(any::<prop::sample::Index>(), 0..3),
         ) {
             let forest = Forest::new(seed, refinement);
-            let (optics, none) = (optics(eye, target), HashSet::new());
+            let (optics, none) = (optics(eye, target, fov_y), HashSet::new());
             let limits = Limits { point_budget, min_size_px };
             let whole = select(&mut forest.tree(forest.pages.keys()), &optics, limits, &none);
             prop_assert!(whole.pages.is_empty());
@@ -541,12 +570,12 @@ mod tests {
         #[test]
         fn picks_keep_the_budget_and_come_after_their_parents(
             seed in any::<u64>(), refinement in refinements(), eye in place(), target in place(),
-            point_budget in 0u64..50_000,
+            fov_y in 0.1..3.1, point_budget in 0u64..50_000,
         ) {
             let forest = Forest::new(seed, refinement);
             let limits = Limits { point_budget, min_size_px: 1.0 };
             let mut trees = forest.tree(forest.pages.keys());
-            let selection = select(&mut trees, &optics(eye, target), limits, &HashSet::new());
+            let selection = select(&mut trees, &optics(eye, target, fov_y), limits, &HashSet::new());
             prop_assert!(selection.points <= point_budget);
             let picks = &selection.picks;
             for (index, pick) in picks.iter().enumerate() {
@@ -572,45 +601,58 @@ mod tests {
 
     #[test]
     fn a_small_motion_back_and_forth_changes_nothing() {
-        let forest = Forest::new(3, Refinement::Additive);
-        let limits = Limits { point_budget: 8000, min_size_px: 20.0 };
+        let forest = Forest::new(SEED, Refinement::Additive);
         let mut trees = forest.tree(forest.pages.keys());
-        let mut selections = Vec::new();
-        let mut previous = HashSet::new();
-        for step in 0..6 {
-            let eye = [128.0 + 2.0 * f64::from(step % 2), -400.0, 128.0];
-            let optics = optics(eye, [128.0; 3]);
-            let selection = select(&mut trees, &optics, limits, &previous);
-            previous = selection.picks.iter().map(|pick| pick.id).collect();
-            selections.push(previous.clone());
-        }
-        assert!(selections[1..].windows(2).all(|pair| pair[0] == pair[1]));
+        let mut swing = |point_budget, remember: bool| {
+            let limits = Limits { point_budget, min_size_px: 20.0 };
+            let mut selections: Vec<HashSet<NodeId>> = vec![HashSet::new()];
+            for step in 0..6 {
+                let eye = [128.0 + 4.0 * f64::from(step % 2), -400.0, 128.0];
+                let previous = if remember { &selections[step as usize] } else { &selections[0] };
+                let selection = select(&mut trees, &optics(eye, [128.0; 3], 1.0), limits, previous);
+                selections.push(selection.picks.iter().map(|pick| pick.id).collect());
+            }
+            selections[2..].windows(2).filter(|pair| pair[0] != pair[1]).count()
+        };
+        let budgets = (2000..20_000).step_by(250);
+        let forgetful: usize = budgets.clone().map(|budget| swing(budget, false)).sum();
+        assert!(forgetful > 0, "without hysteresis, nodes come and go");
+        assert_eq!(budgets.map(|budget| swing(budget, true)).sum::<usize>(), 0);
     }
 
     #[test]
     fn a_node_larger_than_the_budget_hides_nothing_but_itself() {
-        let forest = Forest::new(3, Refinement::Additive);
+        let forest = Forest::new(SEED, Refinement::Additive);
         let mut huge = forest.boot.as_ref().clone();
         huge.root_page.nodes[0].points = 1_000_000;
         let mut trees = forest.tree(forest.pages.keys());
         trees.insert(0, Some(Tree::new(Arc::new(huge))));
         let limits = Limits { point_budget: 8000, min_size_px: 20.0 };
-        let optics = optics([128.0, -400.0, 128.0], [128.0; 3]);
+        let optics = optics([128.0, -400.0, 128.0], [128.0; 3], 1.0);
         let selection = select(&mut trees, &optics, limits, &HashSet::new());
         assert!(!selection.picks.is_empty());
         assert!(selection.picks.iter().all(|pick| pick.id.cloud == 1));
     }
 
     #[test]
+    fn the_tree_of_these_tests_is_large() {
+        let forest = Forest::new(SEED, Refinement::Additive);
+        let limits = Limits { point_budget: u64::MAX, min_size_px: 0.0 };
+        let optics = optics([128.0, -400.0, 128.0], [128.0; 3], 1.0);
+        let mut trees = forest.tree(forest.pages.keys());
+        assert!(select(&mut trees, &optics, limits, &HashSet::new()).picks.len() > 50);
+    }
+
+    #[test]
     fn a_cloud_of_one_point_is_seen_from_afar() {
-        let mut forest = Forest::new(3, Refinement::Additive);
+        let mut forest = Forest::new(SEED, Refinement::Additive);
         let mut boot = forest.boot.as_ref().clone();
         boot.root_page.nodes.truncate(1);
         boot.root_page.nodes[0].child_mask = 0;
         boot.root_page.nodes[0].bounds = LatticeBox { min: [7; 3], max: [7; 3] };
         forest.boot = Arc::new(boot);
         let limits = Limits { point_budget: 8000, min_size_px: 50.0 };
-        let optics = optics([0.0, -1e6, 0.0], [7.0; 3]);
+        let optics = optics([0.0, -1e6, 0.0], [7.0; 3], 1.0);
         let selection = select(&mut forest.tree([]), &optics, limits, &HashSet::new());
         assert_eq!(keys(&selection), [NodeKey::ROOT]);
     }
