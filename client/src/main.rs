@@ -3,8 +3,11 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use lodestream_client::commands::{demo, inspect};
-use lodestream_server::commands::{build, finish, serve, verify};
+use lodestream_client::{
+    commands::{demo, shot},
+    source::{BlockingSource, Source},
+};
+use lodestream_server::commands::{build, finish, inspect, serve, verify};
 
 /// Stream point clouds of any size: build, host, look, measure
 #[derive(Debug, Parser)]
@@ -20,15 +23,22 @@ enum Command {
     Inspect(inspect::InspectArgs),
     Verify(verify::VerifyArgs),
     Serve(serve::ServeArgs),
+    Shot(shot::ShotArgs),
     Demo(demo::DemoArgs),
 }
 
 fn main() -> ExitCode {
     finish(match Cli::parse().command {
         Command::Build(args) => build::run(args),
-        Command::Inspect(args) => inspect::run(args),
+        Command::Inspect(args) => inspect_any(&args),
         Command::Verify(args) => verify::run(args),
         Command::Serve(args) => serve::run(args),
+        Command::Shot(args) => shot::run(args),
         Command::Demo(args) => demo::run(args),
     })
+}
+
+/// Unlike the server's, this one reads URLs too.
+fn inspect_any(args: &inspect::InspectArgs) -> anyhow::Result<ExitCode> {
+    inspect::inspect(args, BlockingSource::new(Source::parse(&args.source)?)?)
 }

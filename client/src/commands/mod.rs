@@ -1,4 +1,4 @@
 //! The commands that need the client; the others are the server's.
 
 pub mod demo;
-pub mod inspect;
+pub mod shot;

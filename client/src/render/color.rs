@@ -58,7 +58,7 @@ impl Coloring {
     }
 
     fn rgb(manifest: &Manifest) -> Option<Self> {
-        let (index, attribute) = find(manifest, "color")?;
+        let (index, attribute) = find(manifest, ColorMode::Rgb)?;
         if attribute.components != 3 {
             return None;
         }
@@ -78,7 +78,7 @@ impl Coloring {
     }
 
     fn intensity(manifest: &Manifest) -> Option<Self> {
-        let (attribute, info) = find(manifest, "intensity")?;
+        let (attribute, info) = find(manifest, ColorMode::Intensity)?;
         let (min, max) = (*info.min.first()?, *info.max.first()?);
         Some(match info.constant() {
             Some(_) => Self::Constant(NEUTRAL),
@@ -105,7 +105,7 @@ impl Coloring {
         attribute.group().filter(|group| *group != 0)
     }
 
-    /// What this colouring reads per point, in words for a user.
+    /// The colouring, for a user.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -116,9 +116,21 @@ impl Coloring {
             Self::Constant(_) => "constant",
         }
     }
+
+    /// Whether the cloud lacks what `mode` asks for, and this is the next best.
+    #[must_use]
+    pub const fn falls_back(&self, mode: ColorMode) -> bool {
+        matches!(
+            (self, mode),
+            (Self::Intensity { .. } | Self::Elevation, ColorMode::Rgb)
+                | (Self::Elevation, ColorMode::Intensity)
+        )
+    }
 }
 
-fn find<'a>(manifest: &'a Manifest, name: &str) -> Option<(usize, &'a Attribute)> {
+/// The attribute that a mode needs, with its index.
+fn find(manifest: &Manifest, mode: ColorMode) -> Option<(usize, &Attribute)> {
+    let name = mode.attribute()?;
     manifest.attributes.iter().enumerate().find(|(_, a)| a.name == name)
 }
 

@@ -12,6 +12,7 @@ mod cpu;
 mod gpu;
 mod picture;
 mod ramp;
+mod renderer;
 mod scene;
 mod settings;
 mod ssim;
@@ -30,12 +31,15 @@ pub use color::Coloring;
 pub use cpu::{CpuRenderer, TruthRenderer};
 pub use gpu::GpuRenderer;
 pub use picture::Picture;
-pub use scene::{DrawNode, Scene};
+pub use renderer::Renderer;
+pub use scene::Scene;
 pub use settings::{
     ColorMode, LARGEST_SIDE_PX, LARGEST_SPLAT_PX, RenderSettings, SMALLEST_SPLAT_PX, Splat,
     SplatSize,
 };
 pub use ssim::ssim;
+
+pub use crate::engine::DrawNode;
 
 /// Why there is no picture. Variants follow what a caller does next.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +59,14 @@ pub enum RenderError {
     /// Pictures of different or too small sizes cannot be compared.
     #[error("pictures of {0} and {1} pixels cannot be compared")]
     Compare(String, String),
+    /// A picture could not be read.
+    #[error("{path}: cannot read the picture: {why}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
     /// The picture could not be written.
     #[error("{path}: cannot write the picture: {why}")]
     Write {

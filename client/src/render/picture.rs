@@ -25,6 +25,21 @@ impl Picture {
         drawn as f64 / self.depth.len().max(1) as f64
     }
 
+    /// Reads the colours of a PNG file; nothing has a depth.
+    ///
+    /// # Errors
+    /// [`RenderError::Read`] where the file cannot be read as a PNG.
+    pub fn read_png(path: &Path) -> Result<Self, RenderError> {
+        let failed = |why: String| RenderError::Read { path: path.to_owned(), why };
+        let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;
+        let image = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png)
+            .map_err(|e| failed(e.to_string()))?
+            .into_rgba8();
+        let (width, height) = image.dimensions();
+        let depth = vec![f32::INFINITY; width as usize * height as usize];
+        Ok(Self { width, height, rgba8: image.into_raw(), depth })
+    }
+
     /// Writes the colours as a PNG file.
     ///
     /// # Errors
@@ -52,9 +67,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("temporary folder");
         let path = folder.path().join("picture.png");
         picture.write_png(&path).expect("written");
-        let read = image::open(&path).expect("a PNG file").into_rgba8();
-        assert_eq!((read.width(), read.height()), (2, 1));
-        assert_eq!(read.into_raw(), picture.rgba8);
+        let read = Picture::read_png(&path).expect("a PNG file");
+        assert_eq!((read.width, read.height), (2, 1));
+        assert_eq!(read.rgba8, picture.rgba8);
+        assert!(Picture::read_png(folder.path()).is_err());
         assert!((picture.coverage() - 0.5).abs() < 1e-12);
         let error = picture.write_png(&folder.path().join("no/such.png")).expect_err("no folder");
         assert!(error.to_string().contains("such.png"), "{error}");

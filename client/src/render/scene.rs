@@ -3,26 +3,18 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use lodestream_protocol::{Manifest, NodeKey, NodePoints};
+use lodestream_protocol::{Manifest, NodeKey};
 
-use crate::render::{Coloring, RenderError, settings::ColorMode};
+use crate::{
+    engine::DrawNode,
+    render::{Coloring, RenderError, settings::ColorMode},
+};
 
-/// A node to draw.
-#[derive(Debug, Clone)]
-pub struct DrawNode {
-    /// Index of its cloud in [`Scene::clouds`].
-    pub cloud: usize,
-    /// Its decoded points.
-    pub points: Arc<NodePoints>,
-}
-
-impl DrawNode {
-    /// Where two points of the same pixel have the same depth, the one that comes first in this
-    /// order is seen; inside a node, the first of the node. So a picture does not depend on the
-    /// order in which nodes arrived.
-    pub(crate) fn order(&self) -> (usize, NodeKey) {
-        (self.cloud, self.points.key)
-    }
+/// Where two points of the same pixel have the same depth, the one that comes first in this order
+/// is seen; inside a node, the first of the node. So a picture does not depend on the order in which
+/// nodes arrived.
+fn order(node: &DrawNode) -> (usize, NodeKey) {
+    (node.cloud, node.key)
 }
 
 /// What is drawn.
@@ -31,7 +23,7 @@ pub struct Scene<'a> {
     /// The clouds: all that the nodes belong to. The renderer that keeps nodes from frame to frame
     /// knows a cloud again by its `Arc`, and a node by its key.
     pub clouds: &'a [Arc<Manifest>],
-    /// The nodes, in any order, each once.
+    /// The nodes, in any order, each once, [`DrawNode::cloud`] counting from the first cloud here.
     pub nodes: &'a [DrawNode],
 }
 
@@ -39,14 +31,13 @@ impl<'a> Scene<'a> {
     /// The nodes in drawing order.
     pub(crate) fn ordered(&self) -> Result<Vec<&'a DrawNode>, RenderError> {
         if let Some(node) = self.nodes.iter().find(|n| n.cloud >= self.clouds.len()) {
-            let (cloud, key) = node.order();
-            let clouds = self.clouds.len();
+            let (cloud, key, clouds) = (node.cloud, node.key, self.clouds.len());
             return Err(RenderError::Scene(format!(
                 "node {key} is of cloud {cloud}, but there are {clouds} clouds"
             )));
         }
         let mut nodes: Vec<_> = self.nodes.iter().collect();
-        nodes.sort_by_key(|node| node.order());
+        nodes.sort_by_key(|node| order(node));
         Ok(nodes)
     }
 }

@@ -54,6 +54,29 @@ pub enum ColorMode {
     Level,
 }
 
+impl ColorMode {
+    /// As it is written.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rgb => "rgb",
+            Self::Elevation => "elevation",
+            Self::Intensity => "intensity",
+            Self::Level => "level",
+        }
+    }
+
+    /// The attribute that it needs, if any.
+    #[must_use]
+    pub const fn attribute(self) -> Option<&'static str> {
+        match self {
+            Self::Rgb => Some("color"),
+            Self::Intensity => Some("intensity"),
+            Self::Elevation | Self::Level => None,
+        }
+    }
+}
+
 /// What a picture is to look like.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderSettings {

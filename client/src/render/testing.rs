@@ -7,7 +7,7 @@ use lodestream_protocol::{
     Primitive, Refinement, ScalarType, Storage,
 };
 
-use crate::render::{DrawNode, Scene};
+use crate::{engine::DrawNode, render::Scene};
 
 /// A manifest without points and attributes.
 pub fn manifest() -> Manifest {
@@ -130,7 +130,7 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
                 Column { attribute: 1, bytes: intensities.collect() },
             ],
         };
-        DrawNode { cloud: 0, points: Arc::new(node) }
+        DrawNode { cloud: 0, key, points: Arc::new(node) }
     });
     TestScene { nodes: nodes.collect(), clouds: vec![Arc::new(manifest)] }
 }

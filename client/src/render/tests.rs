@@ -10,9 +10,10 @@ use lodestream_protocol::{Lattice, Manifest};
 
 use crate::{
     camera::{Camera, Projection},
+    engine::DrawNode,
     render::{
-        ColorMode, CpuRenderer, DrawNode, Frame, GpuRenderer, Picture, RenderSettings, Scene,
-        Splat, SplatSize, TruthRenderer,
+        ColorMode, CpuRenderer, Frame, GpuRenderer, Picture, RenderSettings, Scene, Splat,
+        SplatSize, TruthRenderer,
         ramp::Ramp,
         ssim,
         testing::{self, Point, TestScene, cloud, landscape},

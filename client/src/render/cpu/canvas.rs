@@ -15,11 +15,14 @@ use lodestream_protocol::Manifest;
 use rayon::prelude::*;
 
 use super::footprint::for_each_pixel;
-use crate::render::{
-    color::NodeColor,
-    scene::{DrawNode, Surroundings},
-    settings::Splat,
-    view::{NodeView, View},
+use crate::{
+    engine::DrawNode,
+    render::{
+        color::NodeColor,
+        scene::Surroundings,
+        settings::Splat,
+        view::{NodeView, View},
+    },
 };
 
 /// A pixel on which nothing was drawn: behind everything.
@@ -67,7 +70,7 @@ impl Canvas {
         debug_assert!(next - 1 <= BATCH_POINTS);
         tasks.par_iter().for_each(|&(index, first, end)| {
             let node = nodes[index];
-            let node_view = view.node(&clouds[node.cloud].lattice, node.points.key, [0; 3]);
+            let node_view = view.node(&clouds[node.cloud].lattice, node.key, [0; 3]);
             let positions = &node.points.positions[first..end];
             self.draw_points(view, splat, &node_view, positions, (starts[index] + first) as u64);
         });

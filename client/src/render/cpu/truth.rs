@@ -14,11 +14,14 @@ use lodestream_protocol::Manifest;
 use rayon::prelude::*;
 
 use super::canvas::{BATCH_POINTS, Canvas};
-use crate::render::{
-    Picture, RenderError,
-    scene::{DrawNode, Scene, Surroundings},
-    settings::{LARGEST_SIDE_PX, RenderSettings},
-    view::View,
+use crate::{
+    engine::DrawNode,
+    render::{
+        Picture, RenderError,
+        scene::{Scene, Surroundings},
+        settings::{LARGEST_SIDE_PX, RenderSettings},
+        view::View,
+    },
 };
 
 /// Points that are gathered before they are drawn: enough work to share out between cores.

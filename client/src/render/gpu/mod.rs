@@ -24,12 +24,12 @@ use self::{
     pool::Pool,
     target::Target,
 };
-use crate::render::{
-    Frame, FrameStatistics, RenderError, RenderSettings, Scene, Splat,
-    color::NodeColor,
-    ramp::Ramp,
-    scene::{DrawNode, Surroundings},
-    view::View,
+use crate::{
+    engine::DrawNode,
+    render::{
+        Frame, FrameStatistics, RenderError, RenderSettings, Scene, Splat, color::NodeColor,
+        ramp::Ramp, scene::Surroundings, view::View,
+    },
 };
 
 /// Draws with wgpu, into memory.

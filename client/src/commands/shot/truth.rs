@@ -1,0 +1,144 @@
+//! A shot of every point: read from front to back, whatever its size, drawn as it passes.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Instant,
+};
+
+use anyhow::Context;
+use lodestream_preprocess::Progress;
+use lodestream_protocol::{Dataset, Node, ReadAt, Refinement};
+use lodestream_server::commands::TerminalProgress;
+use rayon::prelude::*;
+
+use super::{Shot, ShotArgs, ShotReport};
+use crate::{
+    camera::Camera,
+    engine::DrawNode,
+    render::{Coloring, FrameStatistics, TruthRenderer},
+    source::{BlockingSource, Source},
+};
+
+/// Samples along each side of a pixel.
+const SAMPLES: u32 = 4;
+
+/// Points that are read and decoded at a time, by all cores.
+const BATCH_POINTS: u64 = 1 << 20;
+
+/// Draws all points of the sources.
+///
+/// # Errors
+/// Where a source cannot be read or the view cannot be drawn.
+pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Shot> {
+    let start = Instant::now();
+    let datasets = args.sources.iter().map(|text| open(text));
+    let datasets = datasets.collect::<anyhow::Result<Vec<_>>>()?;
+    let clouds: Vec<_> = datasets.iter().map(|d| Arc::new(d.manifest().clone())).collect();
+    let settings = args.settings(camera, &clouds)?;
+    let colorings = args.colorings(&clouds);
+    let mut renderer = TruthRenderer::new(&settings, &clouds, SAMPLES)?;
+    let progress = TerminalProgress::default();
+    progress.phase("draw", clouds.iter().map(|cloud| cloud.points).sum(), "points");
+    let mut statistics = FrameStatistics::default();
+    for (cloud, (dataset, text)) in datasets.iter().zip(&args.sources).enumerate() {
+        draw_cloud(&mut renderer, cloud, dataset, &colorings[cloud], |nodes, points| {
+            statistics.nodes += nodes;
+            statistics.points += points;
+            progress.advance(points);
+        })
+        .with_context(|| text.clone())?;
+    }
+    let picture = renderer.finish();
+    progress.finish();
+    let milliseconds = start.elapsed().as_secs_f64() * 1e3;
+    let sum = |count: fn(&Metered) -> &AtomicU64| {
+        datasets.iter().map(|d| count(d.source()).load(Ordering::Relaxed)).sum()
+    };
+    let report = ShotReport {
+        sources: args.sources.clone(),
+        picture: args.output.clone(),
+        size_px: args.size,
+        camera: serde_json::from_str(&settings.camera.to_json())?,
+        renderer: "truth".into(),
+        fallback: None,
+        colors: colorings.iter().map(Coloring::name).collect(),
+        points: statistics.points,
+        nodes: statistics.nodes,
+        requests: sum(|source| &source.requests),
+        bytes: sum(|source| &source.bytes),
+        first_picture_ms: milliseconds,
+        settled_picture_ms: milliseconds,
+        coverage: picture.coverage(),
+        left_out: Default::default(),
+        engine: None,
+        frame: statistics,
+        ssim: None,
+        problems: Vec::new(),
+    };
+    Ok(Shot { picture, report })
+}
+
+fn open(text: &str) -> anyhow::Result<Dataset<Metered>> {
+    let source = BlockingSource::new(Source::parse(text)?)?;
+    let source = Metered { source, requests: AtomicU64::new(0), bytes: AtomicU64::new(0) };
+    Dataset::open(source).with_context(|| text.to_owned())
+}
+
+fn draw_cloud(
+    renderer: &mut TruthRenderer,
+    cloud: usize,
+    dataset: &Dataset<Metered>,
+    coloring: &Coloring,
+    mut done: impl FnMut(u64, u64),
+) -> anyhow::Result<()> {
+    let manifest = dataset.manifest();
+    let mut nodes = dataset.hierarchy()?;
+    if manifest.refinement == Refinement::Replace {
+        // The leaves are the full resolution; what is above stands in for them.
+        nodes.retain(Node::is_leaf);
+    }
+    // The order in which frames draw, so that equally near points are resolved alike.
+    nodes.sort_by_key(|node| node.key);
+    let groups: Vec<usize> = coloring.group(manifest).into_iter().collect();
+    let mut rest = nodes.as_slice();
+    while !rest.is_empty() {
+        let mut points = 0;
+        let fits = |node: &&Node| {
+            points += u64::from(node.points);
+            points <= BATCH_POINTS
+        };
+        // One node at least, however large.
+        let count = rest.iter().take_while(fits).count().max(1);
+        let (batch, next) = rest.split_at(count);
+        rest = next;
+        let read = |node: &Node| dataset.read_node(node, &groups);
+        for points in batch.par_iter().map(read).collect::<Result<Vec<_>, _>>()? {
+            done(1, points.positions.len() as u64);
+            renderer.add_node(DrawNode { cloud, key: points.key, points: Arc::new(points) })?;
+        }
+    }
+    Ok(())
+}
+
+/// A source that counts what is read.
+struct Metered {
+    source: BlockingSource,
+    requests: AtomicU64,
+    bytes: AtomicU64,
+}
+
+impl ReadAt for Metered {
+    fn read_at(&self, offset: u64, len: usize) -> lodestream_protocol::Result<Vec<u8>> {
+        self.requests.fetch_add(1, Ordering::Relaxed);
+        self.bytes.fetch_add(len as u64, Ordering::Relaxed);
+        self.source.read_at(offset, len)
+    }
+
+    fn size(&self) -> lodestream_protocol::Result<u64> {
+        self.requests.fetch_add(1, Ordering::Relaxed);
+        self.source.size()
+    }
+}
