@@ -3,6 +3,5 @@
 pub mod camera;
 pub mod commands;
 pub mod engine;
-pub mod painter;
 pub mod render;
 pub mod source;

@@ -13,7 +13,7 @@ use anyhow::Context;
 use clap::Args;
 use glam::DVec3;
 use lodestream_preprocess::{self as preprocess, BuildConfig, BuildReport, sim};
-use lodestream_protocol::Boot;
+use lodestream_protocol::Manifest;
 use lodestream_server::{
     ServeConfig,
     commands::{TerminalProgress, cancel_on_interrupt, print, write_report},
@@ -24,8 +24,7 @@ use serde::Serialize;
 use crate::{
     camera::{Camera, Projection},
     engine::{Engine, EngineConfig, View},
-    painter::Painter,
-    render::{ColorMode, RenderSettings, Splat, SplatSize},
+    render::{ColorMode, RenderError, RenderSettings, Renderer, Scene, Splat, SplatSize},
     source::Source,
 };
 
@@ -33,6 +32,8 @@ use crate::{
 const DEFAULT_INPUT: &str = "sim:courtyard?points=2M&seed=1";
 /// Width and height of the pictures.
 const SIZE_PX: [u32; 2] = [1280, 720];
+/// Nodes that stay on the GPU from one picture to the next.
+const RESIDENT_BYTES: u64 = 1 << 30;
 /// Longest wait for a picture to be complete.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -125,13 +126,15 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     let server = spawn(ServeConfig::new(&data, SocketAddr::from((Ipv4Addr::LOCALHOST, 0))))?;
     let url = format!("{}/datasets/{name}.lods", server.url());
     print(&format!("serving {url}\n"))?;
-    let mut painter = Painter::best(|why| eprintln!("note: {why}"));
-    print(&format!("drawing with {}\n", painter.describe()))?;
+    let mut renderer = Renderer::open(RESIDENT_BYTES, &mut tell_fallback);
+    print(&format!("drawing with {}\n", renderer.name()))?;
     let engine = Engine::start(vec![Source::parse(&url)?], EngineConfig::default())?;
     let boots = engine.wait_open(PATIENCE)?;
+    let clouds: Vec<Arc<Manifest>> =
+        boots.iter().map(|boot| Arc::new(boot.manifest.clone())).collect();
     let mut stops = Vec::new();
-    for (name, camera) in path(&inputs, &boots[0]) {
-        let stop = visit(&engine, &boots, &mut painter, name, camera, &args.output)?;
+    for (name, camera) in path(&inputs, &clouds[0]) {
+        let stop = visit(&engine, &clouds, &mut renderer, name, camera, &args.output)?;
         print(&format!(
             "  {:<12} {:>9} points, {:>3} requests, {:>6.2} MB, complete after {:>5.0} ms\n",
             stop.name,
@@ -145,7 +148,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     drop(engine);
     server.stop()?;
     let summary =
-        Summary { input: &inputs, url, renderer: painter.describe(), build: &build, stops: &stops };
+        Summary { input: &inputs, url, renderer: renderer.name(), build: &build, stops: &stops };
     write_report(&args.output.join("summary.json"), &summary)?;
     let page = args.output.join("index.html");
     std::fs::write(&page, html(&summary))
@@ -168,17 +171,18 @@ fn dataset_name(input: &str) -> String {
 }
 
 /// Where the camera goes: the simulated scan's own views, or once around any other cloud.
-fn path(inputs: &[String], boot: &Boot) -> Vec<(String, Camera)> {
+fn path(inputs: &[String], cloud: &Manifest) -> Vec<(String, Camera)> {
     if matches!(inputs, [only] if only == DEFAULT_INPUT) {
         return sim::VIEWS.iter().map(|view| (view.name.to_owned(), simulated(view))).collect();
     }
-    let Some((min, max)) = boot.manifest.bounds_world() else { return Vec::new() };
+    let Some((min, max)) = cloud.bounds_world() else { return Vec::new() };
     let aspect = f64::from(SIZE_PX[0]) / f64::from(SIZE_PX[1]);
     let overview = Camera::overview(DVec3::from(min), DVec3::from(max), aspect);
     let moved = |closer: f64, turn: f64, lower: f64| {
         let arm = (overview.eye - overview.target) * closer;
         let (sin, cos) = turn.to_radians().sin_cos();
-        let turned = DVec3::new(arm.x * cos - arm.y * sin, arm.x * sin + arm.y * cos, arm.z * lower);
+        let turned =
+            DVec3::new(arm.x * cos - arm.y * sin, arm.x * sin + arm.y * cos, arm.z * lower);
         Camera { eye: overview.target + turned, ..overview }
     };
     vec![
@@ -201,8 +205,8 @@ fn simulated(view: &sim::View) -> Camera {
 
 fn visit(
     engine: &Engine,
-    boots: &[Arc<Boot>],
-    painter: &mut Painter,
+    clouds: &[Arc<Manifest>],
+    renderer: &mut Renderer,
     name: String,
     camera: Camera,
     folder: &Path,
@@ -215,7 +219,7 @@ fn visit(
         camera,
         splat: Splat::Circle,
         splat_size: SplatSize::Pixels(3.0),
-        color: if boots[0].manifest.attribute("color").is_some() {
+        color: if clouds[0].attribute("color").is_some() {
             ColorMode::Rgb
         } else {
             ColorMode::Elevation
@@ -223,7 +227,8 @@ fn visit(
         background: [255, 255, 255],
     };
     let started = Instant::now();
-    let frame = painter.paint(boots, &plan, &settings)?;
+    let frame =
+        renderer.render(&Scene { clouds, nodes: &plan.nodes }, &settings, &mut tell_fallback)?;
     let draw_ms = started.elapsed().as_secs_f64() * 1e3;
     let picture = format!("{name}.png");
     frame.picture.write_png(&folder.join(&picture))?;
@@ -243,6 +248,10 @@ fn visit(
             over_budget_points: plan.left_out.over_budget.points,
         },
     })
+}
+
+fn tell_fallback(why: &RenderError) {
+    eprintln!("note: {why}; drawing on the CPU");
 }
 
 /// The summary as one page beside its pictures.

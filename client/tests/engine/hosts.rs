@@ -165,6 +165,35 @@ fn a_host_killed_in_mid_stream_comes_back() {
 }
 
 #[test]
+fn requests_that_are_no_longer_wanted_are_broken_off_and_their_slots_are_free() {
+    let recipe = Recipe::default();
+    let bytes = dataset(recipe);
+    let view = overview(recipe.corner);
+    let expected = expected(&bytes, &config(), view);
+    let (reached, mut hanging) = unbounded_channel();
+    let host = Host::start(bytes, move |request| match request.number {
+        0 => Answer::Good,
+        _ => Answer::Hang { share: 0.5, reached: reached.clone() },
+    });
+    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+    engine.set_view(view);
+    for _ in 0..config().requests_in_flight {
+        hanging.blocking_recv().expect("an answer has begun");
+    }
+    engine.set_view(away(view));
+    engine.wait_settled(LONG).expect("nothing is wanted there");
+    while engine.stats().in_flight > 0 {
+        std::thread::yield_now();
+    }
+    let cancelled = engine.stats().since_start.totals.cancelled;
+    assert_eq!(cancelled, config().requests_in_flight as u64);
+    // The first requests still hang: were their slots taken, nothing would come.
+    host.behave(|_| Answer::Good);
+    engine.set_view(view);
+    assert_eq!(picture(&engine.wait_settled(LONG).expect("settles")), expected);
+}
+
+#[test]
 fn a_host_that_is_not_there_yet_is_waited_for() {
     let recipe = Recipe::default();
     let mut host = Host::good(dataset(recipe));
