@@ -19,11 +19,12 @@ use serde::{Deserialize, Serialize};
 /// Full vertical field of view of an [overview](Camera::overview), in degrees.
 const OVERVIEW_FOV_Y_DEGREES: f64 = 50.0;
 
-/// From the middle of the cloud towards the overview's eye: from the south-south-east, well above.
-const OVERVIEW_FROM: DVec3 = DVec3::new(0.35, -1.0, 0.75);
+/// From the cloud towards the overview's eye where the cloud is at least as wide (x) as deep (y):
+/// from the south, a little from the east, well above.
+const OVERVIEW_FROM: DVec3 = DVec3::new(0.3, -1.0, 0.9);
 
-/// How much farther away than necessary an overview stands: 4 % of margin around the cloud.
-const OVERVIEW_MARGIN: f64 = 1.04;
+/// Part of the picture's half width and height that an overview may fill.
+const OVERVIEW_FILL: f64 = 0.96;
 
 /// How the view is projected.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -227,33 +228,46 @@ impl Camera {
     }
 
     /// A perspective camera that sees all of the box in a picture of `aspect` = width / height:
-    /// from above, the box filling the picture as far as its shape allows.
+    /// from above, the longer side across, the box filling the picture as far as its shape allows.
     #[must_use]
     pub fn overview(min: DVec3, max: DVec3, aspect: f64) -> Self {
-        let fov_y = OVERVIEW_FOV_Y_DEGREES.to_radians();
         let middle = 0.5 * (min + max);
-        let camera = Self {
-            eye: middle + OVERVIEW_FROM,
-            target: middle,
-            up: DVec3::Z,
-            projection: Projection::Perspective { fov_y },
+        let extent = max - min;
+        let from = if extent.x >= extent.y {
+            OVERVIEW_FROM
+        } else {
+            // The same, turned by a quarter: from the east.
+            DVec3::new(-OVERVIEW_FROM.y, OVERVIEW_FROM.x, OVERVIEW_FROM.z)
         };
-        // Of the direction itself, not of eye - target, which at large coordinates is coarse.
-        let basis = Self { eye: OVERVIEW_FROM, target: DVec3::ZERO, ..camera }.basis();
-        let tangent_y = (0.5 * fov_y).tan();
-        let tangent_x = tangent_y * aspect;
-        // A corner at (x, y) across and z behind the middle is inside the picture where
-        // |x| <= (distance + z) * tangent_x and |y| <= (distance + z) * tangent_y.
-        let needed = (0..8).map(|corner| {
-            let pick = |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
-            let corner = DVec3::new(pick(0), pick(1), pick(2)) - middle;
-            let (x, y) = (corner.dot(basis.right).abs(), corner.dot(basis.up).abs());
-            (x / tangent_x).max(y / tangent_y) - corner.dot(basis.forward)
+        let fov_y = OVERVIEW_FOV_Y_DEGREES.to_radians();
+        let projection = Projection::Perspective { fov_y };
+        let at_origin = Self { eye: from, target: DVec3::ZERO, up: DVec3::Z, projection };
+        let basis = at_origin.basis();
+        let view_from_world = basis.view_from_world();
+        // With the eye at e (view axes, relative to the middle of the box, z turned to point into
+        // the picture), a corner c is inside the picture's right edge where
+        // c.x - e.x <= (c.z - e.z) * t, and so on for the other edges. The largest e.z (the nearest
+        // eye) that meets the constraints of two opposite edges puts e.x midway between them.
+        let corners: [DVec3; 8] = std::array::from_fn(|corner| {
+            let sign = |axis: usize| if corner >> axis & 1 == 1 { 0.5 } else { -0.5 };
+            let view = view_from_world * (extent * DVec3::new(sign(0), sign(1), sign(2)));
+            DVec3::new(view.x, view.y, -view.z)
         });
-        let distance = OVERVIEW_MARGIN * needed.fold(0.0, f64::max);
+        let most = |bound: &dyn Fn(&DVec3) -> f64| {
+            corners.iter().map(bound).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let fit = |axis: usize, tangent: f64| {
+            let upper = most(&|c| c[axis] - c.z * tangent);
+            let lower = most(&|c| -c[axis] - c.z * tangent);
+            (0.5 * (upper - lower), -(upper + lower) / (2.0 * tangent))
+        };
+        let tangent = OVERVIEW_FILL * (0.5 * fov_y).tan();
+        let ((x, z_for_x), (y, z_for_y)) = (fit(0, tangent * aspect), fit(1, tangent));
         // A cloud without extent is looked at from as near as its coordinates can tell apart.
-        let distance = distance.max(1e-6 * middle.abs().max_element()).max(1e-6);
-        Self { eye: middle - distance * basis.forward, ..camera }
+        let nearest = (1e-6 * middle.abs().max_element()).max(1e-6);
+        let distance = (-z_for_x.min(z_for_y)).max(nearest);
+        let target = middle + x * basis.right + y * basis.up;
+        Self { eye: target - distance * basis.forward, target, ..at_origin }
     }
 }
 
@@ -321,23 +335,31 @@ mod tests {
     }
 
     #[test]
-    fn overview_holds_the_whole_box_and_fills_one_direction() {
+    fn overview_holds_the_whole_box_and_fills_the_picture_one_way() {
         let boxes = [
             (DVec3::new(635_577.0, 848_882.0, 406.0), DVec3::new(639_003.0, 853_537.0, 615.0)),
             (DVec3::splat(-1.0), DVec3::splat(1.0)),
             (DVec3::ZERO, DVec3::new(1e-3, 1e4, 0.0)),
+            (DVec3::ZERO, DVec3::new(3.0, 2.0, 500.0)),
         ];
         for ((min, max), aspect) in boxes.into_iter().flat_map(|b| [(b, 0.5), (b, 16.0 / 9.0)]) {
             let clip = Camera::overview(min, max, aspect).clip_from_world(aspect, 1e-3, 1e9);
-            let mut widest = 0.0_f64;
+            let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
             for corner in 0..8 {
                 let pick =
                     |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
                 let p = clip * DVec3::new(pick(0), pick(1), pick(2)).extend(1.0);
                 assert!(p.w > 0.0);
-                widest = widest.max((p.x / p.w).abs()).max((p.y / p.w).abs());
+                low = low.min(p.truncate() / p.w);
+                high = high.max(p.truncate() / p.w);
             }
-            assert!((0.85..1.0).contains(&widest), "{widest} of the half picture for {min} {max}");
+            // Touches two opposite edges of the part to be filled, and lies within the others.
+            let filled = |axis: usize| {
+                (low[axis] + OVERVIEW_FILL).abs() < 1e-6
+                    && (high[axis] - OVERVIEW_FILL).abs() < 1e-6
+            };
+            assert!(filled(0) || filled(1), "{low} to {high} for {min} {max}");
+            assert!(low.x > -1.0 && low.y > -1.0 && high.x < 1.0 && high.y < 1.0);
         }
     }
 

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use lodestream_client::{
-    commands::{demo, shot},
+    commands::{demo, export, shot},
     source::{BlockingSource, Source},
 };
 use lodestream_server::commands::{build, finish, inspect, serve, verify};
@@ -23,6 +23,7 @@ enum Command {
     Inspect(inspect::InspectArgs),
     Verify(verify::VerifyArgs),
     Serve(serve::ServeArgs),
+    Export(export::ExportArgs),
     Shot(shot::ShotArgs),
     Demo(demo::DemoArgs),
 }
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Inspect(args) => inspect_any(&args),
         Command::Verify(args) => verify::run(args),
         Command::Serve(args) => serve::run(args),
+        Command::Export(args) => export::run(args),
         Command::Shot(args) => shot::run(args),
         Command::Demo(args) => demo::run(args),
     })

@@ -1,4 +1,5 @@
 //! The commands that need the client; the others are the server's.
 
 pub mod demo;
+pub mod export;
 pub mod shot;
