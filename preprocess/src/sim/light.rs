@@ -29,7 +29,7 @@ const CELL: f32 = 1.0;
 const LOW: Vec3 = Vec3::new(-28.0, -26.0, -0.5);
 const CELLS: [usize; 3] = [78, 54, 15];
 /// Rays per cell, in the open and in rooms, whose light comes through few small windows.
-const GATHER_RAYS: [usize; 2] = [48, 256];
+const GATHER_RAYS: [usize; 2] = [24, 112];
 /// Cells with a larger part of their rays inside solids are inside one themselves.
 const INSIDE: f32 = 0.16;
 /// Light in rooms from lamps and from walls that have theirs from walls.
@@ -102,7 +102,7 @@ impl Light {
             let [x, y, z] = [corner[0] + step[0], corner[1] + step[1], corner[2] + step[2]];
             let index = (z * CELLS[1] + y) * CELLS[0] + x;
             let cell = &self.cells[index];
-            if weight < 1e-3 || cell.room != room {
+            if weight < 0.01 || cell.room != room {
                 continue;
             }
             if let Some(cube) = cell.cube.get_or_init(|| self.gather(centre(index), room.is_some()))

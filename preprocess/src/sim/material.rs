@@ -32,7 +32,7 @@ pub struct Spot {
     pub normal: Vec3,
     /// The local axis along which wood was cut: 0, 1 or 2.
     pub grain: usize,
-    /// Number of the primitive, so that every leaf and every book differs.
+    /// A number of the primitive's own, so that every leaf and every book differs.
     pub primitive: u32,
 }
 

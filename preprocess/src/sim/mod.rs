@@ -7,7 +7,7 @@
 //! of methods feed on it. No image, mesh or scan is shipped: the scene is a few hundred lines of code.
 //!
 //! The way of a point: [`SimSpec`] says how many; [`Plan`] cuts them into sectors of exact size;
-//! a [`Scanner`] shoots each; [`material`] and [`light`] give a hit its colour. All randomness is
+//! a [`Scanner`] shoots each; materials and light give a hit its colour. All randomness is
 //! hashed from (seed, station, shot), so that sectors can be scanned by any number of threads.
 
 mod light;

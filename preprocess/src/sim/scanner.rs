@@ -118,14 +118,13 @@ impl Scanner {
         let noise = random.gaussian() * range_deviation(hit.distance, incidence);
         let color = self.light.shade(hit.point, hit.normal, finish.albedo, random);
         let speckle = 1.0 + 0.03 * random.gaussian();
-        // A logarithmic amplifier: 12 bits' worth over four decades, in 16 bits.
-        let level = (1.0 + 0.25 * libm::log10f(strength * speckle)).clamp(0.0, 1.0);
+        let level = amplified(finish.infrared, incidence, hit.distance) * speckle;
         let surface = self.scene.surface(hit.surface);
         Some(Sample {
             position: station.position.as_dvec3() + direction * f64::from(hit.distance + noise),
             normal: hit.normal,
             color,
-            intensity: (level * 65_535.0) as u16,
+            intensity: (level.clamp(0.0, 1.0) * 65_535.0) as u16,
             class: surface.class,
             surface: hit.surface,
         })
@@ -170,6 +169,12 @@ impl Scanner {
 fn strength(infrared: f32, incidence: f32, distance: f32) -> f32 {
     let damped = 100.0 / (distance * distance).max(25.0);
     infrared * incidence * damped
+}
+
+/// What the receiver makes of a return, 0 to 1: an amplitude (the root of the power), in which most
+/// of the loss by distance has been taken back.
+fn amplified(infrared: f32, incidence: f32, distance: f32) -> f32 {
+    (infrared * (0.3 + 0.7 * incidence) * 10.0 / (10.0 + distance)).sqrt()
 }
 
 /// Standard deviation of the range in metres: a millimetre and a half, more with distance, and more
@@ -252,7 +257,9 @@ mod tests {
 
     #[test]
     fn what_faces_away_or_stands_far_off_returns_less() {
-        let faced = strength(0.6, 1.0, 10.0);
-        assert!(strength(0.6, 0.2, 10.0) < faced && strength(0.6, 1.0, 30.0) < faced);
+        for answer in [strength, amplified] {
+            let faced = answer(0.6, 1.0, 10.0);
+            assert!(answer(0.6, 0.2, 10.0) < faced && answer(0.6, 1.0, 30.0) < faced);
+        }
     }
 }

@@ -28,12 +28,6 @@ const USAGE: &str =
     "write sim:courtyard?points=2M&seed=1 (also: normals=0, surfaces=0, offset=X,Y,Z)";
 
 impl SimSpec {
-    /// Whether `input` is an address of this kind (and not a file's name).
-    #[must_use]
-    pub fn is_sim(input: &str) -> bool {
-        input.starts_with("sim:")
-    }
-
     /// Reads an address.
     ///
     /// # Errors

@@ -12,9 +12,9 @@ use crate::sim::shape::{Bounds, Ray, reciprocal};
 const LEAF_PRIMITIVES: usize = 4;
 const BINS: usize = 16;
 /// Deeper nodes are split at the median, so that the stack below always suffices.
-const SAH_DEPTH: usize = 24;
-/// Three siblings wait per level; median splits halve, so that 2^32 primitives add 16 levels of four.
-const STACK: usize = 3 * (SAH_DEPTH + 17);
+const SAH_DEPTH: usize = 12;
+/// Three siblings wait per level; median splits quarter 2^24 primitives in 12 levels.
+const STACK: usize = 3 * (SAH_DEPTH + 12) + 1;
 
 const LEAF: u32 = 1 << 31;
 const COUNT_SHIFT: u32 = 24;

@@ -127,7 +127,7 @@ impl Scene {
             local: shape.local(hit.point),
             normal: hit.normal,
             grain: shape.longest_axis(),
-            primitive: hit.primitive,
+            primitive: self.first_face[hit.primitive as usize],
         };
         self.surface(hit.surface).material.finish(&spot)
     }
@@ -135,16 +135,10 @@ impl Scene {
     /// A surface by its id, as points carry it in `surface_id`.
     ///
     /// # Panics
-    /// If `id` is not below the number of [`surfaces`](Self::surfaces).
+    /// If no surface has this id: ids that points carry are all right.
     #[must_use]
     pub fn surface(&self, id: u16) -> &Surface {
         &self.surfaces[usize::from(id)]
-    }
-
-    /// All surfaces, by id.
-    #[must_use]
-    pub fn surfaces(&self) -> &[Surface] {
-        &self.surfaces
     }
 
     /// The rooms; a point in none of them is in the open.

@@ -58,13 +58,16 @@ pub const MIN_DISTANCE: f32 = 1e-4;
 pub struct Frame {
     local_from_world: Mat3,
     origin: Vec3,
+    /// Most things stand square: their rays need no turning.
+    square: bool,
 }
 
 impl Frame {
     /// At `origin`, turned by `world_from_local` (a rotation).
     #[must_use]
     pub fn turned(origin: Vec3, world_from_local: Mat3) -> Self {
-        Self { local_from_world: world_from_local.transpose(), origin }
+        let square = world_from_local == Mat3::IDENTITY;
+        Self { local_from_world: world_from_local.transpose(), origin, square }
     }
 
     /// At `from`, the local z axis pointing to `to`, and the distance between the two.
@@ -79,8 +82,12 @@ impl Frame {
     /// A ray in local coordinates; distances along it stay what they are.
     #[inline]
     fn ray(&self, ray: &Ray) -> Ray {
+        let origin = ray.origin - self.origin;
+        if self.square {
+            return Ray { origin, direction: ray.direction };
+        }
         Ray {
-            origin: self.local_from_world * (ray.origin - self.origin),
+            origin: self.local_from_world * origin,
             direction: self.local_from_world * ray.direction,
         }
     }

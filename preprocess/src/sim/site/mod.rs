@@ -18,6 +18,7 @@ mod palette;
 mod plants;
 mod roof;
 mod street;
+mod tree;
 
 use super::scene::Builder;
 

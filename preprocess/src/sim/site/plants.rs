@@ -1,4 +1,4 @@
-//! Trees that branch, hedges, ivy, and plants in pots. Leaves are single discs.
+//! Where trees stand; hedges, ivy, flowers and plants in pots. Leaves are single discs.
 
 use glam::Vec3;
 
@@ -7,7 +7,7 @@ use crate::sim::{
     noise::noise2,
     random::Random,
     scene::Builder,
-    site::{arcade::TERRACE, ground::EXTENT, palette::*},
+    site::{arcade::TERRACE, ground::EXTENT, palette::*, tree::Tree},
 };
 
 pub fn build(b: &mut Builder) {
@@ -65,95 +65,6 @@ fn planting_bed(b: &mut Builder, centre: Vec3) {
             let at = centre + Vec3::new(r * angle.cos(), r * angle.sin(), z);
             let normal = random.direction() * 0.8 + Vec3::Z;
             b.leaf(at, normal, random.direction(), (0.05, 0.035), surface);
-        }
-    }
-}
-
-struct Tree {
-    height: f32,
-    /// How far it reaches sideways, 1 for a broad crown.
-    spread: f32,
-    leaves: usize,
-    /// Half the length of a leaf (a bunch of leaves on trees far away).
-    leaf: f32,
-    color: u32,
-    seed: u64,
-}
-
-impl Tree {
-    fn grow(&self, b: &mut Builder, foot: Vec3) {
-        let mut random = Random::of([self.seed, 7, 0, 0]);
-        b.object("tree", class::HIGH_VEGETATION);
-        let bark = b.surface(Material::Bark { color: rgb(0x8A7460) });
-        let crown = b.surface(leaf(self.color));
-        let radius = 0.026 * self.height;
-        // A trunk of a few bends, flared at the foot.
-        let fork = 0.30 * self.height;
-        let (mut at, mut r) = (foot, radius);
-        b.add_to(
-            b.cone_shape(foot, foot + Vec3::Z * 0.25, (1.5 * radius, 1.08 * radius), true),
-            bark,
-        );
-        for _ in 0..4 {
-            let sway = Vec3::new(random.range(-0.04, 0.04), random.range(-0.04, 0.04), 0.25) * fork;
-            let next = at + sway;
-            b.add_to(b.cone_shape(at, next, (r, 0.93 * r), true), bark);
-            (at, r) = (next, 0.93 * r);
-        }
-        let mut twigs = Vec::new();
-        let limb = 0.30 * self.height;
-        self.branch(b, &mut random, (at, Vec3::Z), (0.9 * limb, 0.7 * r), 3, bark, &mut twigs);
-        for i in 0..5 {
-            let angle = (i as f32 + 0.6 * random.unit()) * std::f32::consts::TAU / 5.0;
-            let out = Vec3::new(angle.cos(), angle.sin(), random.range(0.45, 0.95) / self.spread);
-            let start = at - Vec3::Z * (0.25 * random.unit() * fork);
-            let length = limb * random.range(0.8, 1.0);
-            self.branch(
-                b,
-                &mut random,
-                (start, out.normalize()),
-                (length, 0.55 * r),
-                3,
-                bark,
-                &mut twigs,
-            );
-        }
-        for _ in 0..self.leaves {
-            let &(from, to) = &twigs[(random.unit() * twigs.len() as f32) as usize];
-            let scatter = Vec3::new(random.gaussian(), random.gaussian(), random.gaussian());
-            let at = from.lerp(to, random.range(0.1, 1.15)) + scatter * (0.026 * self.height);
-            let normal = random.direction() + Vec3::Z * 0.7;
-            let long = self.leaf * random.range(0.7, 1.2);
-            b.leaf(at, normal, random.direction(), (long, 0.62 * long), crown);
-        }
-    }
-
-    #[allow(clippy::too_many_arguments)]
-    fn branch(
-        &self,
-        b: &mut Builder,
-        random: &mut Random,
-        (start, along): (Vec3, Vec3),
-        (length, radius): (f32, f32),
-        level: usize,
-        bark: u16,
-        twigs: &mut Vec<(Vec3, Vec3)>,
-    ) {
-        let end = start + along * length;
-        b.add_to(b.cone_shape(start, end, (radius, 0.6 * radius), false), bark);
-        if level <= 1 {
-            twigs.push((start, end));
-        }
-        if level == 0 {
-            return;
-        }
-        for i in 0..4 {
-            // The leader goes on; the others leave it along its upper half.
-            let from = if i == 0 { end } else { start.lerp(end, random.range(0.45, 0.95)) };
-            let bend = if i == 0 { 0.35 } else { 0.95 };
-            let turned = (along + random.direction() * bend + Vec3::Z * 0.12).normalize();
-            let part = length * random.range(0.55, 0.75);
-            self.branch(b, random, (from, turned), (part, 0.55 * radius), level - 1, bark, twigs);
         }
     }
 }
