@@ -1,9 +1,9 @@
 //! One dataset file, opened for one request.
 
 use std::{
-    fs::{File, OpenOptions},
+    fs::{File, Metadata, OpenOptions},
     io,
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::SystemTime,
 };
 
@@ -34,13 +34,12 @@ pub(crate) enum OpenError {
 impl DatasetFile {
     /// Opens the file and looks at its header.
     pub(crate) fn open(path: PathBuf) -> Result<Self, OpenError> {
-        let file = open_regular(&path)?;
-        let modified = file.metadata().and_then(|m| m.modified());
+        let (file, metadata) = open_regular(&path)?;
         let source = FileSource::from(file);
         let mut head = [0; HEADER_BYTES];
         let read = source.read_into(&mut head, 0).map_err(unreadable)?;
         let header = Header::parse(&head[..read]).map_err(unreadable)?;
-        let length = source.file().metadata().map_err(unreadable)?.len();
+        let length = metadata.len();
         if length < header.file_bytes {
             return Err(unreadable(FormatError::Truncated {
                 what: "dataset",
@@ -50,14 +49,14 @@ impl DatasetFile {
         }
         let validators = Validators {
             etag: format!("\"{}\"", header.content_id_hex()),
-            modified: modified.ok().and_then(|m| http_date(m, SystemTime::now())),
+            modified: metadata.modified().ok().and_then(|m| http_date(m, SystemTime::now())),
         };
         Ok(Self { path, source, bytes: header.file_bytes, validators })
     }
 }
 
 /// Opens a regular file; never waits for the other end of a pipe.
-pub(crate) fn open_regular(path: &PathBuf) -> Result<File, OpenError> {
+pub(crate) fn open_regular(path: &Path) -> Result<(File, Metadata), OpenError> {
     let mut options = OpenOptions::new();
     options.read(true);
     #[cfg(unix)]
@@ -70,7 +69,7 @@ pub(crate) fn open_regular(path: &PathBuf) -> Result<File, OpenError> {
         _ => unreadable(e),
     })?;
     match file.metadata() {
-        Ok(metadata) if metadata.is_file() => Ok(file),
+        Ok(metadata) if metadata.is_file() => Ok((file, metadata)),
         Ok(_) => Err(OpenError::Missing),
         Err(e) => Err(unreadable(e)),
     }

@@ -138,17 +138,16 @@ fn look_up(
     file_name: &str,
     known: Option<(Identity, DatasetEntry)>,
 ) -> Result<(Identity, DatasetEntry), OpenError> {
-    let unreadable = |e: String| OpenError::Unreadable(e);
     let path = folder.path_of(file_name).ok_or(OpenError::Missing)?;
     if let (Some(known), Ok(metadata)) = (known, std::fs::metadata(&path))
         && known.0 == Identity::of(&metadata)
     {
         return Ok(known);
     }
-    let file = open_regular(&path)?;
-    let identity = file.metadata().map_err(|e| unreadable(e.to_string()))?;
-    let dataset = Dataset::open(FileSource::from(file)).map_err(|e| unreadable(e.to_string()))?;
-    Ok((Identity::of(&identity), entry(file_name, &dataset)))
+    let (file, metadata) = open_regular(&path)?;
+    let dataset =
+        Dataset::open(FileSource::from(file)).map_err(|e| OpenError::Unreadable(e.to_string()))?;
+    Ok((Identity::of(&metadata), entry(file_name, &dataset)))
 }
 
 fn entry(file_name: &str, dataset: &Dataset<FileSource>) -> DatasetEntry {

@@ -3,60 +3,70 @@
 //! Opening a file whose directory entry is cached takes microseconds; a hop to the blocking pool
 //! and back costs several times as much, on every request. On a network file system the same call
 //! may take milliseconds, during which a runtime thread would serve nobody else. So calls run in
-//! place until one was slow, and for a while after that on the pool.
+//! place until several were slow, and on the pool until most are quick again. One slow call says
+//! nothing: on a busy machine, the thread may just have lost its processor for a while.
 
 use std::{
-    sync::atomic::{AtomicU64, Ordering},
+    sync::atomic::{AtomicU32, Ordering},
     time::{Duration, Instant},
 };
 
 /// A call longer than this counts as slow.
 const PATIENCE: Duration = Duration::from_millis(1);
-/// How long a slow call sends its followers to the pool.
-const CAUTION: Duration = Duration::from_secs(1);
+/// What a slow call adds to the score; a quick one takes 1 away. So calls go to the pool while more
+/// than one in 11 is slow.
+const SLOW_SCORE: u32 = 10;
+/// From this score on, calls go to the pool.
+const POOL_SCORE: u32 = 2 * SLOW_SCORE;
+/// No memory reaches further back.
+const MAX_SCORE: u32 = 3 * SLOW_SCORE;
 
 /// Decides by the time that earlier calls took.
 #[derive(Debug)]
 pub(crate) struct Offload {
-    start: Instant,
-    /// Milliseconds after `start`.
-    cautious_until_ms: AtomicU64,
+    score: AtomicU32,
     patience: Duration,
 }
 
 impl Offload {
-    pub(crate) fn new() -> Self {
-        Self::with_patience(PATIENCE)
+    pub(crate) const fn new() -> Self {
+        Self { score: AtomicU32::new(0), patience: PATIENCE }
     }
 
-    fn with_patience(patience: Duration) -> Self {
-        Self { start: Instant::now(), cautious_until_ms: AtomicU64::new(0), patience }
-    }
-
-    /// Runs `work`, which must not panic.
+    /// Runs `work`.
     pub(crate) async fn run<T, F>(&self, work: F) -> T
     where
         T: Send + 'static,
         F: FnOnce() -> T + Send + 'static,
     {
-        let begin = self.start.elapsed();
-        let is_cautious = millis(begin) < self.cautious_until_ms.load(Ordering::Relaxed);
-        let result = if is_cautious {
-            let outcome = tokio::task::spawn_blocking(work).await;
-            outcome.unwrap_or_else(|e| std::panic::resume_unwind(e.into_panic()))
-        } else {
-            work()
+        let timed = || {
+            let start = Instant::now();
+            let result = work();
+            (result, start.elapsed())
         };
-        let end = self.start.elapsed();
-        if end.saturating_sub(begin) > self.patience {
-            self.cautious_until_ms.fetch_max(millis(end + CAUTION), Ordering::Relaxed);
-        }
+        let (result, duration) = if self.score.load(Ordering::Relaxed) < POOL_SCORE {
+            timed()
+        } else {
+            // The task is never cancelled: it can only fail by a panic of `work`.
+            let outcome = tokio::task::spawn_blocking(timed).await;
+            outcome.unwrap_or_else(|e| std::panic::resume_unwind(e.into_panic()))
+        };
+        self.note(duration > self.patience);
         result
     }
-}
 
-fn millis(duration: Duration) -> u64 {
-    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
+    fn note(&self, was_slow: bool) {
+        let score = self.score.load(Ordering::Relaxed);
+        let next = match was_slow {
+            true => (score + SLOW_SCORE).min(MAX_SCORE),
+            false => score.saturating_sub(1),
+        };
+        // Of two threads at once one may be forgotten: it is a rule of thumb. A score that stays
+        // zero is not written, so that threads share the line in their caches.
+        if next != score {
+            self.score.store(next, Ordering::Relaxed);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -64,18 +74,25 @@ mod tests {
     use super::*;
     use std::thread;
 
+    async fn is_in_place(offload: &Offload) -> bool {
+        offload.run(|| thread::current().id()).await == thread::current().id()
+    }
+
     #[tokio::test]
     async fn quick_calls_stay_on_the_thread() {
-        let offload = Offload::with_patience(Duration::MAX);
-        for _ in 0..3 {
-            assert_eq!(offload.run(|| thread::current().id()).await, thread::current().id());
+        let offload = Offload { patience: Duration::MAX, ..Offload::new() };
+        for _ in 0..100 {
+            assert!(is_in_place(&offload).await);
         }
     }
 
     #[tokio::test]
-    async fn calls_after_a_slow_one_go_to_the_pool() {
-        let offload = Offload::with_patience(Duration::ZERO);
-        assert_eq!(offload.run(|| thread::current().id()).await, thread::current().id());
-        assert_ne!(offload.run(|| thread::current().id()).await, thread::current().id());
+    async fn one_slow_call_changes_nothing_but_two_do() {
+        let mut offload = Offload { patience: Duration::ZERO, ..Offload::new() };
+        assert!(is_in_place(&offload).await);
+        assert!(is_in_place(&offload).await);
+        assert!(!is_in_place(&offload).await);
+        offload.patience = Duration::MAX;
+        while !is_in_place(&offload).await {}
     }
 }

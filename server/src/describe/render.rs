@@ -47,7 +47,7 @@ fn method(d: &Description) -> String {
     let m = &d.method;
     let leaf = count(u64::from(m.leaf_capacity));
     let (refinement, primitive) = (name(&d.refinement), name(&d.primitive));
-    format!("{}, grid {}, leaves to {leaf}; {refinement}, {primitive}s", m.name, m.grid)
+    format!("{}, grid {}, leaves of up to {leaf}; {refinement} {primitive}s", m.name, m.grid)
 }
 
 fn lattice(d: &Description) -> String {
