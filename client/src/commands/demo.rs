@@ -230,7 +230,7 @@ fn visit(
     let frame =
         renderer.render(&Scene { clouds, nodes: &plan.nodes }, &settings, &mut tell_fallback)?;
     let draw_ms = started.elapsed().as_secs_f64() * 1e3;
-    let picture = format!("{name}.png");
+    let picture = format!("{}.png", name.replace(' ', "-"));
     frame.picture.write_png(&folder.join(&picture))?;
     Ok(Stop {
         name,

@@ -1,0 +1,275 @@
+//! The command line as scripts rely on it: real programs, real files, a real server on a free port.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+    process::{Child, Command, Output, Stdio},
+};
+
+use lodestream_tests::program;
+
+fn lodestream(arguments: &[&str]) -> Output {
+    let program = program("lodestream").expect("built beside the tests");
+    Command::new(program).args(arguments).output().expect("starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn succeeds(arguments: &[&str]) -> String {
+    let output = lodestream(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+/// Runs and expects exit 1 with one line that starts with `error: `.
+fn fails(arguments: &[&str]) -> String {
+    let output = lodestream(arguments);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
+    let errors: Vec<&str> = stderr.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert_eq!(errors.len(), 1, "{arguments:?}: {stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+    errors[0].to_owned()
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.path().join(name).display().to_string()
+    }
+
+    fn file(&self, name: &str, bytes: &[u8]) -> String {
+        fs::write(self.0.path().join(name), bytes).expect("written");
+        self.path(name)
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.0.path()).expect("listed");
+        let name = |e: std::io::Result<fs::DirEntry>| e.expect("listed").file_name();
+        let mut names: Vec<String> =
+            entries.map(|e| name(e).to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+/// A program that ends with its guard.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn serve(folder: &str) -> (Running, String) {
+    let mut child = Command::new(program("lodestream-server").expect("built"))
+        .args(["serve", folder, "--listen", "127.0.0.1:0"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("starts");
+    let mut line = String::new();
+    let stdout = child.stdout.take().expect("piped");
+    BufReader::new(stdout).read_line(&mut line).expect("prints its address");
+    let start = line.find("http://").expect("an address");
+    (Running(child), line[start..].trim().to_owned())
+}
+
+fn fixture(name: &str) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    root.join("fixtures").join(name).display().to_string()
+}
+
+const SCAN: &str = "sim:courtyard?points=30k&seed=3";
+
+#[test]
+fn what_is_built_is_sound_and_comes_back_from_las_laz_and_ply() {
+    let folder = Folder::new();
+    let dataset = folder.path("scan.lods");
+    let report = folder.path("report.json");
+    succeeds(&["build", SCAN, "-o", &dataset, "--report", &report]);
+    let report: serde_json::Value =
+        serde_json::from_slice(&fs::read(report).expect("written")).expect("JSON");
+    assert_eq!(report["points_written"], 30_000);
+    succeeds(&["verify", &dataset, "--against", SCAN]);
+    for name in ["out.las", "out.laz", "out.ply"] {
+        let exported = folder.path(name);
+        succeeds(&["export", &dataset, "-o", &exported]);
+        let again = folder.path("again.lods");
+        succeeds(&["build", &exported, "-o", &again]);
+        let described: serde_json::Value =
+            serde_json::from_str(&succeeds(&["inspect", &again, "--json"])).expect("JSON");
+        assert_eq!(described["points"], 30_000, "{name}");
+    }
+}
+
+#[test]
+fn real_scans_are_built_and_verified_against_their_files() {
+    let folder = Folder::new();
+    let dataset = folder.path("scan.lods");
+    for name in ["las/autzen.las", "las/autzen.laz", "las/autzen.copc.laz", "las/extrabytes.laz"] {
+        succeeds(&["build", &fixture(name), "-o", &dataset, "--threads", "3"]);
+        let output = lodestream(&["verify", &dataset, "--against", &fixture(name)]);
+        assert!(output.status.success(), "{name}: {}", text(&output.stdout));
+        let other = folder.path("other.lods");
+        succeeds(&["build", &fixture(name), "-o", &other, "--threads", "1", "--memory", "1MiB"]);
+        assert!(fs::read(&dataset).expect("there") == fs::read(&other).expect("there"), "{name}");
+    }
+}
+
+#[test]
+fn bad_input_is_one_line_and_exit_1() {
+    let folder = Folder::new();
+    let las = fs::read(fixture("las/autzen.las")).expect("a fixture");
+    let laz = fs::read(fixture("las/autzen.laz")).expect("a fixture");
+    let mut lying = las.clone();
+    // The point count of a LAS 1.2 header.
+    lying[107..111].copy_from_slice(&u32::MAX.to_le_bytes());
+    let ply = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+                property float z\nend_header\n1 2 3\n";
+    let cases: [(&str, &[u8], &str); 9] = [
+        ("empty.las", b"", "empty"),
+        ("cut.las", &las[..las.len() - 100], "cut.las"),
+        ("cut.laz", &laz[..laz.len() / 2], "cut.laz"),
+        ("header.las", &las[..50], "header.las"),
+        ("lying.las", &lying, "4294967295"),
+        ("cut.ply", ply, "3"),
+        ("nan.xyz", b"nan 1 2\ninf 1 2\n", "unusable"),
+        (
+            "none.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n\
+          property float y\nproperty float z\nend_header\n",
+            "no points",
+        ),
+        ("photo.jpg", b"\xff\xd8\xff\xe0 not a point cloud", "not a point cloud"),
+    ];
+    for (name, bytes, expected) in cases {
+        let input = folder.file(name, bytes);
+        let output = folder.path("out.lods");
+        let error = fails(&["build", &input, "-o", &output]);
+        assert!(error.contains(expected), "{name}: {error}");
+        assert!(error.contains(name), "{name} is not named: {error}");
+        assert!(!Path::new(&output).exists(), "{name}: an output was left");
+    }
+    let good = fixture("las/autzen.las");
+    fails(&["build", &good, "-o", &folder.path("no/such/folder/out.lods")]);
+    fails(&["build", "sim:nowhere?points=1", "-o", &folder.path("out.lods")]);
+    fails(&["inspect", &good]);
+    fails(&["verify", &folder.path("not-there.lods")]);
+}
+
+#[test]
+fn one_point_and_a_million_equal_ones_are_clouds() {
+    let folder = Folder::new();
+    let dataset = folder.path("out.lods");
+    for (name, points) in [("one.xyz", 1), ("same.xyz", 1_000_000)] {
+        let input = folder.file(name, "1.5 2.5 3.5\n".repeat(points).as_bytes());
+        succeeds(&["build", &input, "-o", &dataset]);
+        succeeds(&["verify", &dataset, "--against", &input]);
+    }
+}
+
+#[test]
+fn bad_usage_is_exit_2() {
+    for arguments in [
+        &["build"][..],
+        &["build", "a.las", "-o", "a.txt"],
+        &["build", "a.las", "-o", "a.lods", "--grid", "100"],
+        &["shot", "a.lods", "-o", "a.png", "--splat", "blob"],
+        &["export", "a.lods", "-o", "a.las", "--bounds", "1,2,3"],
+        &["nonsense"],
+    ] {
+        assert_eq!(lodestream(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_picture_over_http_is_the_picture_of_the_file() {
+    let folder = Folder::new();
+    let dataset = folder.path("scan.lods");
+    succeeds(&["build", SCAN, "-o", &dataset]);
+    let (server, address) = serve(&folder.path(""));
+    let url = format!("{address}/datasets/scan.lods");
+    let mut pictures = Vec::new();
+    for (name, source) in [("file.png", &dataset), ("http.png", &url)] {
+        let picture = folder.path(name);
+        let size = ["--size", "320x200", "--renderer", "cpu"];
+        let mut arguments = vec!["shot", source, "-o", &picture];
+        arguments.extend(size);
+        succeeds(&arguments);
+        pictures.push(fs::read(picture).expect("drawn"));
+    }
+    assert!(pictures[0] == pictures[1], "the pictures differ");
+    let described = succeeds(&["inspect", &url, "--json"]);
+    let described: serde_json::Value = serde_json::from_str(&described).expect("JSON");
+    assert_eq!(described["points"], 30_000);
+    let exported = folder.path("out.ply");
+    succeeds(&["export", &url, "-o", &exported, "--level", "0"]);
+    assert!(fs::metadata(exported).expect("written").len() > 0);
+    drop(server);
+    fails(&["inspect", &url]);
+}
+
+/// Starts a long build and hands it over once it has read its input.
+fn build_under_way(output: &str) -> (Child, BufReader<impl Read + use<>>) {
+    let mut child = Command::new(program("lodestream").expect("built"))
+        .args(["build", "sim:courtyard?points=400k&seed=1", "-o", output])
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    let mut stderr = BufReader::new(child.stderr.take().expect("piped"));
+    let mut line = String::new();
+    while !line.starts_with("read") {
+        line.clear();
+        assert!(stderr.read_line(&mut line).expect("told") > 0, "ended before it had read");
+    }
+    (child, stderr)
+}
+
+#[test]
+fn a_killed_build_leaves_nothing_that_looks_whole() {
+    let folder = Folder::new();
+    let output = folder.path("out.lods");
+    let (mut child, _stderr) = build_under_way(&output);
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    let whole: Vec<String> = folder.names().into_iter().filter(|n| n.ends_with(".lods")).collect();
+    assert!(whole.is_empty(), "{whole:?}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_build_says_so_and_cleans_up() {
+    let folder = Folder::new();
+    let output = folder.path("out.lods");
+    let (mut child, mut stderr) = build_under_way(&output);
+    let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(interrupted.expect("kill runs").success());
+    let mut rest = String::new();
+    stderr.read_to_string(&mut rest).expect("told");
+    assert_eq!(child.wait().expect("ended").code(), Some(1), "{rest}");
+    assert!(rest.contains("error: interrupted"), "{rest}");
+    assert_eq!(folder.names(), Vec::<String>::new());
+}
+
+#[test]
+fn the_demo_writes_pictures_and_a_page() {
+    let folder = Folder::new();
+    let out = PathBuf::from(folder.path("demo"));
+    let said = succeeds(&["demo", &fixture("las/autzen.las"), "-o", &out.display().to_string()]);
+    assert!(said.contains("index.html"), "{said}");
+    let page = fs::read_to_string(out.join("index.html")).expect("written");
+    for name in ["overview.png", "near.png"] {
+        assert!(page.contains(name) && out.join(name).is_file(), "{name}");
+    }
+}
