@@ -1,9 +1,9 @@
 //! LAS and LAZ, versions 1.0 to 1.5, point formats 0 to 10; COPC files are LAZ files.
 //!
 //! The `las` crate parses the header and the `laz` crate decodes compressed points. Between them
-//! and the blocks lies our own path, because going through a struct for each point took 30 times as
-//! long: large spans of records are read with positioned reads or decoded by chunks, by all threads,
-//! and copied into blocks by a list of moves made up beforehand.
+//! and the blocks lies our own path, without a struct for each point: spans of records are read
+//! with positioned reads, or decoded by chunks, on all threads, and copied into blocks by a list of
+//! moves made up beforehand.
 //!
 //! | file | what |
 //! | --- | --- |

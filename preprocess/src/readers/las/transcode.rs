@@ -3,8 +3,8 @@
 //! What has to be copied where is worked out once, as a short list of moves: runs of bytes that lie
 //! the same way in the record and in the block's row are one move, and the bit fields of one byte
 //! are one look-up in a table. Moves run one after another over tiles that stay in the first-level
-//! cache, each with its width known to the compiler: about a nanosecond a move and point, where
-//! interpreting the list for each point took three times as long.
+//! cache, each with its width known to the compiler. The six moves of format 2 take 2 ns a point so,
+//! as long as a loop over points that is written out for that format alone.
 
 use lodestream_protocol::ScalarType;
 
@@ -18,7 +18,7 @@ use crate::readers::{BLOCK_POINTS, Block, InputAttribute, Positions};
 const TILE_BYTES: usize = 12 << 10;
 
 /// Bytes of records that are read or decoded at a time.
-const SPAN_BYTES: usize = 128 << 10;
+const SPAN_BYTES: usize = 64 << 10;
 
 /// Most bytes of a block.
 const LARGEST_BLOCK_BYTES: usize = 8 << 20;
