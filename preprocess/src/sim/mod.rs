@@ -4,7 +4,7 @@
 //! analytic [`scene`](Scene), so that density falls with distance, walls cast scan shadows, ranges
 //! carry noise and weak returns are lost, as in real scans; but any number of points can be had,
 //! and the true surface and normal of each is known. The demo, scale tests and comparisons
-//! of methods feed on it. No image, mesh or scan is shipped: the scene is a few hundred lines of code.
+//! of methods feed on it. No image, mesh or scan is shipped: the scene is code.
 //!
 //! The way of a point: [`SimSpec`] says how many; [`Plan`] cuts them into sectors of exact size;
 //! a [`Scanner`] shoots each; materials and light give a hit its colour. All randomness is
