@@ -179,6 +179,9 @@ const CHUNK_SIZES: ChunkSizes = ChunkSizes { min: 1 << 17, max: 1 << 20, wanted:
 /// Bytes of working memory per point of a chunk in core, besides its rows.
 const CHUNK_BYTES_PER_POINT: u64 = 80;
 
+/// What stays of a chunk when its payloads are put away.
+type ChunkResult = (Vec<OutNode>, Ranges, chunk::Root);
+
 struct Phases<'a> {
     progress: &'a dyn Progress,
     started: Instant,
@@ -186,7 +189,7 @@ struct Phases<'a> {
     name: String,
 }
 
-impl<'a> Phases<'a> {
+impl Phases<'_> {
     fn begin(&mut self, name: &str, total: u64, unit: &str) {
         self.end();
         self.name = name.into();
@@ -336,8 +339,7 @@ fn build_in_pool(
     let chunks = plan.chunks.len();
     let blobs = Blobs::new(chunks + 1, config.memory_bytes / 4, folder.to_path_buf());
     let skins: Vec<Mutex<Option<Arc<Skin>>>> = (0..chunks).map(|_| Mutex::new(None)).collect();
-    let results: Vec<Mutex<Option<(Vec<OutNode>, Ranges, chunk::Root)>>> =
-        (0..chunks).map(|_| Mutex::new(None)).collect();
+    let results: Vec<Mutex<Option<ChunkResult>>> = (0..chunks).map(|_| Mutex::new(None)).collect();
     let cost =
         |i: usize| plan.chunks[i].points * (CHUNK_BYTES_PER_POINT + 2 * layout.row_bytes as u64);
     schedule::run(&dependencies, threads, cost, config.memory_bytes / 2, |i| {

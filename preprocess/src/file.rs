@@ -81,8 +81,7 @@ impl ReadAt for FileSource {
     }
 
     fn size(&self) -> FormatResult<u64> {
-        let failed =
-            |e: io::Error| FormatError::Read { offset: 0, len: 0, message: e.to_string() };
+        let failed = |e: io::Error| FormatError::Read { offset: 0, len: 0, message: e.to_string() };
         Ok(self.file.metadata().map_err(failed)?.len())
     }
 }

@@ -241,7 +241,8 @@ fn check_points(manifest: &Manifest, node: &Node, points: &NodePoints, report: &
         tight.grow(std::array::from_fn(|a| q[a] + corner[a]));
     }
     let inside = |outer: &LatticeBox| outer.contains(tight.min) && outer.contains(tight.max);
-    if !points.positions.is_empty() && !(inside(&node.bounds) && inside(&manifest.bounds)) {
+    let all_inside = inside(&node.bounds) && inside(&manifest.bounds);
+    if !points.positions.is_empty() && !all_inside {
         report.find(format!("node {}: points outside its bounds", node.key));
     }
     let code = |q: &[u32; 3]| <u128 as lodestream_protocol::MortonCode>::encode(*q);
