@@ -12,9 +12,9 @@ use crate::sim::{
 pub const ROAD_LEVEL: f32 = -0.13;
 
 /// From x to x: as far as anything is built.
-pub const EXTENT: (f32, f32) = (-22.0, 45.0);
+pub const EXTENT: (f32, f32) = (-22.0, 38.0);
 /// Southern end of the park.
-const PARK_END: f32 = -25.0;
+const PARK_END: f32 = -18.6;
 
 pub fn build(b: &mut Builder) {
     let flags = Material::Flags { color: rgb(0xB3ADA2), size: Vec2::new(0.5, 0.5), bond: 0.5 };
@@ -38,8 +38,8 @@ pub fn build(b: &mut Builder) {
     b.object("park", class::GROUND);
     b.block((west, PARK_END, -0.4), (east, south - 2.2, -0.01), Material::Grass);
     b.block((11.0, PARK_END, -0.3), (13.6, south - 2.2, 0.01), Material::Gravel);
-    b.block((west, -17.6, -0.3), (11.0, -15.8, 0.01), Material::Gravel);
-    b.block((13.6, -17.6, -0.3), (east, -15.8, 0.01), Material::Gravel);
+    b.block((west, -15.6, -0.3), (11.0, -14.2, 0.01), Material::Gravel);
+    b.block((13.6, -15.6, -0.3), (east, -14.2, 0.01), Material::Gravel);
     b.object("garden", class::GROUND);
     b.block((west, 0.0, -0.6), (-0.4, 25.2, -0.01), Material::Grass);
     b.block((26.0, 0.0, -0.6), (east, 25.2, -0.01), Material::Grass);

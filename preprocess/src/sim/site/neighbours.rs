@@ -201,21 +201,4 @@ fn east(b: &mut Builder) {
             });
         }
     });
-    let far = TownHouse {
-        length: 8.0,
-        depth: 10.0,
-        storeys: 3,
-        wall: Material::Plaster { color: rgb(0xB9C3A6), stains: 0.5 },
-        base: ASHLAR,
-        shutters: None,
-        door: 4.0,
-        windows: &[1.5, 4.0, 6.5],
-        ridge: 13.0,
-        tiled: false,
-    };
-    b.place(Vec3::new(36.4, -0.4, 0.0), 0.0, |b| {
-        far.build(b);
-        far.core(b, 0.0, far.length);
-        far.roof().chimney(b, 4.0, 1.0);
-    });
 }

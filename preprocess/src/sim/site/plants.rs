@@ -19,16 +19,15 @@ pub fn build(b: &mut Builder) {
         Tree { height: 3.9, spread: 0.85, leaves: 2400, leaf: 0.05, color: 0x93A876, seed: 2 };
     olive.grow(b, Vec3::new(19.6, 4.3, 0.0));
     for (x, y, height, color, seed) in [
-        (-13.5, -13.6, 9.0, 0x5C8C33, 11),
-        (2.6, -20.5, 10.5, 0x6A963A, 12),
-        (19.5, -21.0, 9.5, 0x7DA042, 13),
-        (33.5, -13.8, 8.6, 0x5E8E38, 14),
-        (40.5, -20.0, 10.0, 0x74983C, 15),
+        (-13.5, -16.9, 8.6, 0x5C8C33, 11),
+        (-4.2, -17.4, 7.8, 0x6A963A, 12),
+        (20.5, -17.2, 8.2, 0x7DA042, 13),
+        (31.5, -16.8, 8.6, 0x5E8E38, 14),
     ] {
         let tree = Tree { height, spread: 1.0, leaves: 4200, leaf: 0.115, color, seed };
         tree.grow(b, Vec3::new(x, y, -0.02));
     }
-    for (x, seed) in [(-10.4, 21), (0.9, 22), (23.6, 23), (38.6, 24)] {
+    for (x, seed) in [(-10.4, 21), (0.9, 22), (23.6, 23), (36.2, 24)] {
         b.object("tree pit", class::GROUND);
         b.turned((x, -2.35, -0.2), &[(0.55, 0.0), (0.55, 0.21)], Material::Soil);
         let tree =
