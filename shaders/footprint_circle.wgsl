@@ -1,7 +1,7 @@
 // Footprint: a circle that faces the picture. A pixel is covered where its middle is at most
 // size/2 from the centre, and where it holds the centre: so a splat never falls between pixels.
 
-const VERTICES_PER_SPLAT = 4u;
+const VERTICES_PER_SPLAT = 3u;
 
 struct Varyings {
     @builtin(position) clip: vec4<f32>,
@@ -11,10 +11,14 @@ struct Varyings {
 }
 
 fn footprint_vertex(footprint: Footprint, corner: u32, color: vec4<f32>) -> Varyings {
-    // The whole pixels of the square around it; the fragment stage cuts the corners off.
-    let side = vec2(f32(corner & 1u), f32(corner >> 1u)) - 0.5;
-    let px = floor(footprint.center_px + side * footprint.size_px + 0.5);
+    // One triangle around it costs less to set up than the two of a square, which for small splats
+    // is all the cost; the fragment stage cuts the corners off. Its inner circle holds the middles
+    // of all covered pixels, that of the one with the centre too (at most sqrt(0.5) away), and a
+    // margin for rasterisers that snap vertices.
     let radius_px = 0.5 * footprint.size_px;
+    let reach_px = max(radius_px, 0.7072) + 0.02;
+    let corners = array(vec2(0.0, -2.0), vec2(1.7320508, 1.0), vec2(-1.7320508, 1.0));
+    let px = footprint.center_px + reach_px * corners[corner];
     let circle = vec3(footprint.center_px, radius_px * radius_px);
     return Varyings(clip_from_px(px, footprint.depth), color, circle);
 }

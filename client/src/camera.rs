@@ -1,8 +1,6 @@
 //! The camera: where it stands, what it sees. All in f64 world units.
 //!
-//! View space is right-handed: x to the right, y up, and the camera looks along -z. Clip space is
-//! that of wgpu (y up, depth 0 to 1) with reversed depth: 1 at the near plane, 0 infinitely far
-//! away, so that the precision of floating-point depth is spent evenly over all distances.
+//! View space is right-handed: x to the right, y up, and the camera looks along -z.
 //!
 //! A camera is read from and written to a small JSON file:
 //!
@@ -13,7 +11,7 @@
 //! with `orthographic_height` (world units from the lower to the upper edge) in place of
 //! `fov_y_degrees` for an orthographic view. `up` may be left out: +z.
 
-use glam::{DMat3, DMat4, DVec3, DVec4};
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// Full vertical field of view of an [overview](Camera::overview), in degrees.
@@ -187,35 +185,6 @@ impl Camera {
         ViewBasis { right, up: right.cross(forward), forward }
     }
 
-    /// Clip space from world space for a picture of `aspect` = width / height: reversed depth,
-    /// `near` world units for 1 and infinity for 0 in perspective; in an orthographic view, depth
-    /// falls from 1 at the eye's plane to 0 at `far`.
-    ///
-    /// For culling. The renderers do not use it: at large coordinates they need the difference to
-    /// the eye taken first.
-    #[must_use]
-    pub fn clip_from_world(&self, aspect: f64, near: f64, far: f64) -> DMat4 {
-        let clip_from_view = match self.projection {
-            Projection::Perspective { fov_y } => {
-                let scale = 1.0 / (0.5 * fov_y).tan();
-                DMat4::from_cols(
-                    DVec4::new(scale / aspect, 0.0, 0.0, 0.0),
-                    DVec4::new(0.0, scale, 0.0, 0.0),
-                    DVec4::new(0.0, 0.0, 0.0, -1.0),
-                    DVec4::new(0.0, 0.0, near, 0.0),
-                )
-            }
-            Projection::Orthographic { height } => DMat4::from_cols(
-                DVec4::new(2.0 / (height * aspect), 0.0, 0.0, 0.0),
-                DVec4::new(0.0, 2.0 / height, 0.0, 0.0),
-                DVec4::new(0.0, 0.0, 1.0 / far, 0.0),
-                DVec4::new(0.0, 0.0, 1.0, 1.0),
-            ),
-        };
-        let rotation = self.basis().view_from_world();
-        clip_from_view * DMat4::from_mat3(rotation) * DMat4::from_translation(-self.eye)
-    }
-
     /// Pixels that one world unit across the view takes up at `distance` world units along the view
     /// direction, in a picture `height_px` pixels high.
     #[must_use]
@@ -273,6 +242,8 @@ impl Camera {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
 
     fn camera() -> Camera {
@@ -343,15 +314,19 @@ mod tests {
             (DVec3::ZERO, DVec3::new(3.0, 2.0, 500.0)),
         ];
         for ((min, max), aspect) in boxes.into_iter().flat_map(|b| [(b, 0.5), (b, 16.0 / 9.0)]) {
-            let clip = Camera::overview(min, max, aspect).clip_from_world(aspect, 1e-3, 1e9);
-            let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            let camera = Camera::overview(min, max, aspect);
+            let ViewBasis { right, up, forward } = camera.basis();
+            let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
             for corner in 0..8 {
                 let pick =
                     |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
-                let p = clip * DVec3::new(pick(0), pick(1), pick(2)).extend(1.0);
-                assert!(p.w > 0.0);
-                low = low.min(p.truncate() / p.w);
-                high = high.max(p.truncate() / p.w);
+                let view = DVec3::new(pick(0), pick(1), pick(2)) - camera.eye;
+                let distance = view.dot(forward);
+                assert!(distance > 0.0);
+                // Half heights of the picture.
+                let scale = camera.pixels_per_world(distance, 2);
+                let seen = scale * DVec2::new(view.dot(right) / aspect, view.dot(up));
+                (low, high) = (low.min(seen), high.max(seen));
             }
             // Touches two opposite edges of the part to be filled, and lies within the others.
             let filled = |axis: usize| {
@@ -368,18 +343,5 @@ mod tests {
         for p in [DVec3::ZERO, DVec3::new(5e5, 5e6, 100.0), DVec3::splat(-1e9)] {
             Camera::overview(p, p, 1.5).check().expect("eye and target differ");
         }
-    }
-
-    #[test]
-    fn depth_is_reversed_from_near_to_infinity() {
-        let camera = camera();
-        let depth = |distance: f64| {
-            let p = camera.eye + distance * camera.basis().forward;
-            let clip = camera.clip_from_world(1.0, 0.5, 1e9) * p.extend(1.0);
-            clip.z / clip.w
-        };
-        assert!((depth(0.5) - 1.0).abs() < 1e-12);
-        assert!(depth(10.0) > depth(11.0));
-        assert!(depth(1e12) < 1e-12);
     }
 }

@@ -226,8 +226,9 @@ fn a_cloud_far_from_the_origin_gives_the_picture_of_the_same_cloud_at_the_origin
     let at_origin = cloud(lattice(0.001, 16), 3, &points);
     // Close to the ball's surface: a millimetre is several pixels.
     let near = Camera {
-        eye: DVec3::new(20.0, 14.0, 27.0),
-        target: DVec3::new(19.66, 21.0, 26.2),
+        // Exact in f64 with the shift added, not in f32.
+        eye: DVec3::new(20.117_187_5, 14.296_875, 27.101_562_5),
+        target: DVec3::new(19.664_062_5, 21.0, 26.203_125),
         up: DVec3::Z,
         projection: Projection::Perspective { fov_y: 0.7 },
     };
@@ -262,7 +263,8 @@ fn the_nearer_point_is_seen_at_every_distance_of_a_scene_with_depth_ratio_ten_mi
     // 0.1 % (at least one unit) behind a red one.
     let middle = 1 << 30;
     let slope = |exponent: u32| -0.175 + 0.05 * f64::from(exponent);
-    let mut points = Vec::new();
+    // The far corner of the world, beside the view: what is near lies in a very large node.
+    let mut points = vec![Point { q: [0, 1, 0], rgb: [0, 0, 255], intensity: 0 }];
     for exponent in 0..8 {
         let near = 200 * 10_u32.pow(exponent);
         for (distance, rgb) in [(near + near.div_ceil(1000), [0, 255, 0]), (near, [255, 0, 0])] {

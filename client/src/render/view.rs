@@ -202,6 +202,13 @@ mod tests {
             let place = view.displacement(&lattice, NodeKey::ROOT, [0; 3]);
             assert_eq!(place, DVec3::new(scale, 0.0, 0.0));
         }
+        // A step of a millimetre, which is not representable, at coordinates that are not either.
+        let eye = DVec3::new(500_000.1, 5_000_000.123, 100.3);
+        let view = View::new(&settings(eye), 1, 1000.0);
+        let offset = eye.to_array();
+        let lattice = Lattice { scale: 0.001, offset, origin: [1, 2, 3], side_bits: 10 };
+        let place = view.displacement(&lattice, NodeKey::ROOT, [0; 3]);
+        assert_eq!(place, DVec3::new(0.001, 0.002, 0.003));
     }
 
     #[test]

@@ -265,11 +265,11 @@ impl GpuRenderer {
             };
             pass.set_pipeline(pipeline);
             pass.set_bind_group(1, page, &[]);
+            let points = CHUNK_POINTS as u32;
             match footprint {
-                Footprint::Point => pass.draw(0..CHUNK_POINTS as u32, run.chunks.clone()),
-                Footprint::Square | Footprint::Circle => {
-                    pass.draw_indexed(0..6 * CHUNK_POINTS as u32, 0, run.chunks.clone());
-                }
+                Footprint::Point => pass.draw(0..points, run.chunks.clone()),
+                Footprint::Square => pass.draw_indexed(0..6 * points, 0, run.chunks.clone()),
+                Footprint::Circle => pass.draw(0..3 * points, run.chunks.clone()),
             }
         }
     }
