@@ -74,12 +74,10 @@ fn assert_alike(name: &str, a: &Picture, b: &Picture, least_equal: f64) {
     println!("{name}: SSIM {similarity:.6}, {equal:.6} of the pixels equal; see {folder}");
     assert!(similarity >= 0.99, "{name}: SSIM {similarity}; see {folder}");
     assert!(equal >= least_equal, "{name}: only {equal} of the pixels equal; see {folder}");
-    for (i, (a, b)) in a.depth.iter().zip(&b.depth).enumerate() {
-        // Where both show the same splat, its depth is the same; elsewhere the share above bounds.
-        if a.is_finite() != b.is_finite() {
-            assert!(equal < 1.0, "{name}: pixel {i} has depth {a} and {b} but the same colour");
-        }
-    }
+    let same = |(a, b): &(&f32, &f32)| a == b || (**a - **b).abs() <= 1e-5 * a.abs();
+    let same_depth = a.depth.iter().zip(&b.depth).filter(same).count();
+    let same_depth = same_depth as f64 / a.depth.len() as f64;
+    assert!(same_depth >= least_equal, "{name}: only {same_depth} of the depths equal");
 }
 
 fn lattice(scale: f64, side_bits: u8) -> Lattice {
