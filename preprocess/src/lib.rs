@@ -33,4 +33,4 @@ pub use build::{
 };
 pub use error::{Error, Result};
 pub use file::FileSource;
-pub use verify::{Comparison, VerifyConfig, VerifyReport, verify};
+pub use verify::{Comparison, MAX_FINDINGS, VerifyConfig, VerifyReport, verify};

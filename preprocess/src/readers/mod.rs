@@ -3,7 +3,7 @@
 //! A reader is opened on an input, tells what it will deliver ([`InputInfo`]), then streams every
 //! point in blocks. Coordinates come in the source's own numbers (integers where it has them), so
 //! that nothing is rounded before the lattice is known. Adding a format means adding a file and a
-//! line in [`open`].
+//! line where inputs are opened (`inputs.rs`).
 
 mod ahead;
 mod color;

@@ -59,7 +59,7 @@ pub fn print(text: &str) -> anyhow::Result<()> {
 /// Prints a value as indented JSON and a line end.
 ///
 /// # Errors
-/// As for [`print`].
+/// As for [`print()`].
 pub fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     print(&(serde_json::to_string_pretty(value)? + "\n"))
 }

@@ -3,7 +3,7 @@
 //! The delimiter (comma, semicolon, tab, blanks) is told from the first line that holds three
 //! numbers. What the columns mean is told, in this order, by the `columns` option, by a header line
 //! before the points (`x,y,z,intensity`, also behind `//` or `#`), or by the numbers themselves:
-//! see [`columns::guessed`], and the note that says how they were understood.
+//! see `columns::guessed`, and the note that says how they were understood.
 //!
 //! Types do not depend on the numbers found, so that the files of one dataset agree: colours are
 //! 16-bit (8-bit values stay as they are, fractions of one are scaled), normals single precision,
