@@ -170,6 +170,8 @@ fn serve_prints_its_address_first_and_ends_on_the_termination_signal() {
     assert!(url.starts_with("http://127.0.0.1:") && !url.ends_with(":0"), "{line}");
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let status = runtime.expect("a runtime").block_on(async {
+        // Built together with the client, reqwest has TLS and asks for a provider, used or not.
+        let _ = rustls::crypto::ring::default_provider().install_default();
         reqwest::get(format!("{url}/healthz")).await.expect("the server answers").status()
     });
     assert_eq!(status, 200);

@@ -65,6 +65,8 @@ impl Site {
         let mut config = ServeConfig::new(folder.path(), SocketAddr::from(([127, 0, 0, 1], 0)));
         change(&mut config);
         let server = spawn(config).expect("port 0 is free");
+        // Built together with the client, reqwest has TLS and asks for a provider, used or not.
+        let _ = rustls::crypto::ring::default_provider().install_default();
         Self { folder, server, client: reqwest::Client::new() }
     }
 
