@@ -28,8 +28,14 @@ pub fn manifest(side_bits: u8, levels: u8, groups: usize, attributes: Vec<Attrib
         lattice: Lattice { scale: 0.01, offset: [0.0; 3], origin: [0; 3], side_bits },
         bounds: LatticeBox { min: [0; 3], max: [0; 3] },
         largest_rounding: 0.0,
+        groups: (0..groups)
+            .map(|group| {
+                let own = attributes.iter().filter(|a| a.group() == Some(group)).count();
+                let columns = vec![0; usize::from(group == 0) + own];
+                GroupInfo { name: group.to_string(), columns }
+            })
+            .collect(),
         attributes,
-        groups: (0..groups).map(|i| GroupInfo { name: i.to_string(), bytes: 0 }).collect(),
         crs: None,
         sources: Vec::new(),
     }

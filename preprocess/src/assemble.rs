@@ -114,21 +114,18 @@ pub struct Written {
 }
 
 /// Writes the file beside `output`, syncs it, and renames it to `output`. `nodes` are in
-/// breadth-first order. The manifest's group sizes are filled in here.
+/// breadth-first order.
 ///
 /// # Errors
 /// Where the file cannot be written; nothing is left behind then.
 pub fn write(
     output: &Path,
-    manifest: &mut Manifest,
+    manifest: &Manifest,
     nodes: &[OutNode],
     blobs: &FinishedBlobs,
     advance: &dyn Fn(u64) -> Result<()>,
 ) -> Result<Written> {
     let groups = manifest.groups.len();
-    for (group, info) in manifest.groups.iter_mut().enumerate() {
-        info.bytes = nodes.iter().map(|n| u64::from(n.payloads[group].bytes)).sum();
-    }
     let pages = paginate(nodes);
     // Group offsets per page, counted from the end of the index.
     let mut offset = 0;

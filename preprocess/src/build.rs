@@ -388,14 +388,12 @@ fn build_in_pool(
     assemble::sort(&mut nodes);
     manifest.nodes = nodes.len() as u64;
     manifest.levels = nodes.last().map_or(0, |n| n.key.level() + 1);
-    for (attribute, components) in manifest.attributes.iter_mut().zip(&ranges.components) {
-        fill_range(attribute, components);
-    }
+    ranges.fill(&mut manifest);
 
     let blobs = blobs.finish();
     let payload_bytes: u64 = ranges.column_bytes.iter().sum();
     phases.begin("write", payload_bytes, "bytes");
-    let written = assemble::write(&config.output, &mut manifest, &nodes, &blobs, &|bytes| {
+    let written = assemble::write(&config.output, &manifest, &nodes, &blobs, &|bytes| {
         progress.advance(bytes);
         check()
     })?;
@@ -580,23 +578,6 @@ fn check_chunks(plan: &Plan, capacity: u64, memory_bytes: u64) -> Result<()> {
         )));
     }
     Ok(())
-}
-
-fn fill_range(attribute: &mut lodestream_protocol::Attribute, components: &[(f64, f64)]) {
-    if let Some(value) = attribute.constant() {
-        let size = attribute.scalar.size_bytes();
-        let values = value.chunks_exact(size).map(|v| attribute.scalar.to_f64(v));
-        attribute.min = values.clone().collect();
-        attribute.max = values.collect();
-    } else if components.iter().all(|r| r.0.is_finite() && r.1.is_finite()) {
-        attribute.min = components.iter().map(|r| r.0).collect();
-        attribute.max = components.iter().map(|r| r.1).collect();
-    }
-    // JSON has no infinities: an attribute with NaN or infinite values may have no finite range.
-    if attribute.min.iter().chain(&attribute.max).any(|v| !v.is_finite()) {
-        attribute.min.clear();
-        attribute.max.clear();
-    }
 }
 
 struct Joined {

@@ -1,7 +1,7 @@
 //! From points to node payloads: gathers a node's columns and encodes them, group by group.
 
 use lodestream_protocol::{
-    Attribute, Domain, Error as FormatError, GroupInfo, LatticeBox, MortonCode, NodeKey,
+    Attribute, Domain, Error as FormatError, GroupInfo, LatticeBox, Manifest, MortonCode, NodeKey,
     ScalarType, encode_column, encode_positions,
 };
 
@@ -14,7 +14,7 @@ pub struct Layout {
     pub attributes: Vec<Attribute>,
     /// Per attribute: where its value starts in a cut row.
     pub offsets: Vec<usize>,
-    /// The manifest's groups; sizes are filled in at the end.
+    /// The manifest's groups; bytes are filled in at the end.
     pub groups: Vec<GroupInfo>,
     /// Bytes of a cut row: what varies.
     pub row_bytes: usize,
@@ -56,7 +56,7 @@ impl Layout {
         let mut row_bytes = 0;
         let mut offsets = Vec::new();
         let mut kept = Vec::new();
-        let mut groups = vec![GroupInfo { name: "base".into(), bytes: 0 }];
+        let mut groups = vec![GroupInfo { name: "base".into(), columns: vec![0] }];
         let mut attributes = Vec::new();
         for ((input, &offset), &constant) in
             schema.attributes.iter().zip(&schema.offsets).zip(constant)
@@ -72,9 +72,10 @@ impl Layout {
             } else {
                 let name = group_name(input);
                 let group = groups.iter().position(|g| g.name == name).unwrap_or_else(|| {
-                    groups.push(GroupInfo { name: name.into(), bytes: 0 });
+                    groups.push(GroupInfo { name: name.into(), columns: Vec::new() });
                     groups.len() - 1
                 });
+                groups[group].columns.push(0);
                 lodestream_protocol::Storage::Column { group }
             };
             attributes.push(Attribute {
@@ -142,6 +143,19 @@ impl Ranges {
         }
     }
 
+    /// Tells the manifest the ranges and the bytes of its columns.
+    pub fn fill(&self, manifest: &mut Manifest) {
+        for (attribute, components) in manifest.attributes.iter_mut().zip(&self.components) {
+            fill_range(attribute, components);
+        }
+        let columns = manifest.attributes.iter().map(Attribute::group);
+        let columns = std::iter::once(Some(0)).chain(columns).zip(&self.column_bytes);
+        for (index, group) in manifest.groups.iter_mut().enumerate() {
+            let own = columns.clone().filter(|(group, _)| *group == Some(index));
+            group.columns = own.map(|(_, &bytes)| bytes).collect();
+        }
+    }
+
     fn grow(&mut self, attribute: usize, scalar: ScalarType, values: &[u8]) {
         let ranges = &mut self.components[attribute];
         let size = scalar.size_bytes();
@@ -174,6 +188,23 @@ impl Ranges {
                 }
             }
         }
+    }
+}
+
+fn fill_range(attribute: &mut Attribute, components: &[(f64, f64)]) {
+    if let Some(value) = attribute.constant() {
+        let size = attribute.scalar.size_bytes();
+        let values = value.chunks_exact(size).map(|v| attribute.scalar.to_f64(v));
+        attribute.min = values.clone().collect();
+        attribute.max = values.collect();
+    } else if components.iter().all(|r| r.0.is_finite() && r.1.is_finite()) {
+        attribute.min = components.iter().map(|r| r.0).collect();
+        attribute.max = components.iter().map(|r| r.1).collect();
+    }
+    // JSON has no infinities: an attribute with NaN or infinite values may have no finite range.
+    if attribute.min.iter().chain(&attribute.max).any(|v| !v.is_finite()) {
+        attribute.min.clear();
+        attribute.max.clear();
     }
 }
 

@@ -137,6 +137,7 @@ pub fn verify(config: &VerifyConfig, progress: &dyn Progress) -> Result<VerifyRe
         }
     };
     check_tree(manifest, &nodes, &mut report);
+    check_sizes(manifest, &nodes, &mut report);
 
     progress.phase("decode", manifest.points, "points");
     let groups: Vec<usize> = (0..manifest.groups.len()).collect();
@@ -227,6 +228,21 @@ fn check_tree(manifest: &Manifest, nodes: &[Node], report: &mut VerifyReport) {
     }
     if deepest != manifest.levels {
         report.find(format!("{deepest} levels, the manifest says {}", manifest.levels));
+    }
+}
+
+/// Groups take as many bytes as the manifest says.
+fn check_sizes(manifest: &Manifest, nodes: &[Node], report: &mut VerifyReport) {
+    for (index, group) in manifest.groups.iter().enumerate() {
+        let payloads = nodes.iter().filter_map(|node| node.payloads.get(index));
+        let bytes: u64 = payloads.map(|payload| u64::from(payload.bytes)).sum();
+        if bytes != group.bytes() {
+            report.find(format!(
+                "group {}: {bytes} bytes in the nodes, the manifest says {}",
+                group.name,
+                group.bytes()
+            ));
+        }
     }
 }
 

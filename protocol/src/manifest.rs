@@ -61,12 +61,20 @@ pub struct Method {
 }
 
 /// A column group: columns that are fetched together.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GroupInfo {
     /// `base` for group 0, which holds the positions; others by content.
     pub name: String,
+    /// Bytes of each column over all nodes, in column order; group 0 begins with the positions'.
+    pub columns: Vec<u64>,
+}
+
+impl GroupInfo {
     /// Bytes of the group over all nodes.
-    pub bytes: u64,
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.columns.iter().fold(0, |sum, &bytes| sum.saturating_add(bytes))
+    }
 }
 
 /// One input the dataset was made from.
@@ -179,6 +187,16 @@ impl Manifest {
                 }
             }
         }
+        for (index, group) in self.groups.iter().enumerate() {
+            let columns = usize::from(index == 0) + self.columns_of(index).count();
+            if group.columns.len() != columns {
+                return bad(format!(
+                    "group {} tells the bytes of {} columns, it has {columns}",
+                    group.name,
+                    group.columns.len()
+                ));
+            }
+        }
         for &(name, components) in self.primitive.required_attributes() {
             if self.attribute(name).is_none_or(|a| a.components != components) {
                 return bad(format!(
@@ -212,5 +230,58 @@ impl Manifest {
     pub fn bounds_world(&self) -> Option<([f64; 3], [f64; 3])> {
         (self.points > 0)
             .then(|| (self.lattice.world(self.bounds.min), self.lattice.world(self.bounds.max)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attribute::{ScalarType, Storage};
+
+    fn manifest() -> Manifest {
+        Manifest {
+            generator: String::new(),
+            points: 0,
+            nodes: 0,
+            levels: 0,
+            refinement: Refinement::Additive,
+            primitive: Primitive::Point,
+            method: Method { name: String::new(), grid: 128, leaf_capacity: 1 },
+            lattice: Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits: 8 },
+            bounds: LatticeBox::EMPTY,
+            largest_rounding: 0.0,
+            attributes: vec![Attribute {
+                name: "intensity".into(),
+                scalar: ScalarType::U16,
+                components: 1,
+                domain: Domain::Element,
+                storage: Storage::Column { group: 1 },
+                min: vec![],
+                max: vec![],
+            }],
+            groups: vec![
+                GroupInfo { name: "base".into(), columns: vec![7] },
+                GroupInfo { name: "more".into(), columns: vec![8] },
+            ],
+            crs: None,
+            sources: vec![],
+        }
+    }
+
+    #[test]
+    fn every_column_tells_its_bytes() {
+        assert!(manifest().to_json().is_ok());
+        for (group, columns) in [(0, vec![]), (0, vec![7, 7]), (1, vec![]), (1, vec![8, 8])] {
+            let mut manifest = manifest();
+            manifest.groups[group].columns = columns;
+            let error = manifest.to_json().expect_err("refused").to_string();
+            assert!(error.contains("tells the bytes of"), "{error}");
+        }
+    }
+
+    #[test]
+    fn the_bytes_of_a_group_do_not_overflow() {
+        let group = GroupInfo { name: "base".into(), columns: vec![u64::MAX, 1] };
+        assert_eq!(group.bytes(), u64::MAX);
     }
 }

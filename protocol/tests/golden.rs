@@ -80,17 +80,30 @@ fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
     let positions = [vec![[0, 1, 2], [15, 15, 15]], vec![[3, 0, 7]]];
     let keys = [NodeKey::ROOT, NodeKey::ROOT.child(5).expect("octant")];
     let mut payloads: Vec<Vec<Vec<u8>>> = Vec::new();
+    let mut infos: Vec<GroupInfo> = (0..groups)
+        .map(|group| {
+            let name = if group == 0 { "base".into() } else { format!("group{group}") };
+            let own = attributes.iter().filter(|a| a.group() == Some(group)).count();
+            GroupInfo { name, columns: vec![0; usize::from(group == 0) + own] }
+        })
+        .collect();
     for (n, positions) in positions.iter().enumerate() {
         let mut node = vec![Vec::new(); groups];
+        let mut columns = vec![0; groups];
+        columns[0] = 1;
         let codes: Vec<u64> = positions.iter().map(|&q| morton_encode(q)).collect();
         encode_positions(&mut node[0], &codes, lattice.node_bits(n as u8)).expect("encodes");
+        infos[0].columns[0] += node[0].len() as u64;
         for (attribute, values) in &elements {
             let group = attribute.group().expect("a column");
+            let before = node[group].len();
             encode_column(&mut node[group], attribute, &values[n]).expect("encodes");
+            infos[group].columns[columns[group]] += (node[group].len() - before) as u64;
+            columns[group] += 1;
         }
         payloads.push(node);
     }
-    let mut manifest = Manifest {
+    let manifest = Manifest {
         generator: "golden".into(),
         points: 3,
         nodes: 2,
@@ -102,15 +115,10 @@ fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
         bounds: LatticeBox { min: [0, 0, 2], max: [15, 15, 15] },
         largest_rounding: 0.0,
         attributes,
-        groups: vec![],
+        groups: infos,
         crs: None,
         sources: vec![SourceInfo { name: "golden.las".into(), points: 3 }],
     };
-    for group in 0..groups {
-        let name = if group == 0 { "base".into() } else { format!("group{group}") };
-        let bytes = payloads.iter().map(|p| p[group].len() as u64).sum();
-        manifest.groups.push(GroupInfo { name, bytes });
-    }
     // Offsets from the end of the index: group by group, root before child.
     let mut offset = 0;
     let mut offsets = [Vec::new(), Vec::new()];

@@ -56,6 +56,7 @@ struct Built {
     folder: tempfile::TempDir,
     scan: String,
     dataset: String,
+    report: serde_json::Value,
 }
 
 fn built() -> Built {
@@ -70,12 +71,12 @@ fn built() -> Built {
     let report = fs::read(report).expect("a report");
     let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
     assert_eq!(report["points_written"], 20_000);
-    Built { folder, scan, dataset }
+    Built { folder, scan, dataset, report }
 }
 
 #[test]
 fn a_built_dataset_is_sound_and_described_in_full() {
-    let Built { folder: _folder, scan, dataset } = built();
+    let Built { folder: _folder, scan, dataset, report } = built();
     let columns = ["--columns", "x,y,z,intensity"];
     let out = done(&[&["verify", &dataset, "--against", &scan], &columns[..]].concat());
     assert!(out.contains("the same, bit by bit") && out.ends_with("sound\n"), "{out}");
@@ -93,6 +94,20 @@ fn a_built_dataset_is_sound_and_described_in_full() {
     let index = json["index_bytes"].as_u64().expect("a number");
     let file = fs::metadata(&dataset).expect("it is there").len();
     assert_eq!(sum("groups", "bytes") + index, file);
+    let columns: Vec<&serde_json::Value> = json["groups"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .flat_map(|group| group["columns"].as_array().expect("a list"))
+        .collect();
+    let bytes: Vec<_> = columns.iter().map(|c| (&c["name"], &c["bytes"])).collect();
+    let reported = report["columns"].as_array().expect("a list");
+    let reported: Vec<_> = reported.iter().map(|c| (&c["name"], &c["bytes"])).collect();
+    assert_eq!(bytes, reported);
+    assert_eq!(
+        bytes.iter().map(|(_, b)| b.as_u64().expect("a number")).sum::<u64>(),
+        sum("groups", "bytes")
+    );
     assert_eq!(json["bounds"]["min"][0], 500.0);
 
     let text = done(&["inspect", &dataset]);

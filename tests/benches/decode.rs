@@ -68,7 +68,7 @@ fn main() -> Result<()> {
             "| {} | {} | {:.2} | {millions_per_second:.1} | {:.0} | {:.0} |",
             info.name,
             columns.join(" "),
-            info.bytes as f64 / points,
+            info.bytes() as f64 / points,
             millions_per_second * values as f64,
             millions_per_second * bytes as f64,
         );

@@ -513,7 +513,7 @@ mod tests {
             bounds: LatticeBox { min: [0; 3], max: [255; 3] },
             largest_rounding: 0.0,
             attributes: vec![],
-            groups: vec![GroupInfo { name: "base".into(), bytes: 0 }],
+            groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
             crs: None,
             sources: vec![],
         }

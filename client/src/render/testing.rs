@@ -23,7 +23,7 @@ pub fn manifest() -> Manifest {
         bounds: LatticeBox::EMPTY,
         largest_rounding: 0.0,
         attributes: Vec::new(),
-        groups: vec![GroupInfo { name: "base".into(), bytes: 0 }],
+        groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
         crs: None,
         sources: Vec::new(),
     }
@@ -101,7 +101,7 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
         min: vec![0.0; usize::from(components)],
         max: vec![max; usize::from(components)],
     };
-    let group = |name: &str| GroupInfo { name: name.into(), bytes: 0 };
+    let group = |name: &str, columns| GroupInfo { name: name.into(), columns };
     let manifest = Manifest {
         points: points.len() as u64,
         nodes: by_node.len() as u64,
@@ -112,7 +112,7 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
             attribute("color", ScalarType::U16, 3, 0, 65_535.0),
             attribute("intensity", ScalarType::U16, 1, 1, 1000.0),
         ],
-        groups: vec![group("base"), group("intensity")],
+        groups: vec![group("base", vec![0, 0]), group("intensity", vec![0])],
         ..manifest()
     };
     let nodes = by_node.into_iter().map(|(key, points)| {

@@ -115,8 +115,8 @@ fn manifest(recipe: Recipe) -> Manifest {
             attribute("intensity", ScalarType::U16, 1, 1),
         ],
         groups: vec![
-            GroupInfo { name: "base".into(), bytes: 0 },
-            GroupInfo { name: "intensity".into(), bytes: 0 },
+            GroupInfo { name: "base".into(), columns: vec![0, 0] },
+            GroupInfo { name: "intensity".into(), columns: vec![0] },
         ],
         crs: None,
         sources: vec![],

@@ -10,7 +10,7 @@ use lodestream_protocol::{Dataset, ReadAt};
 use super::{print, print_json};
 use crate::describe::{describe, render};
 
-/// Tell what a dataset holds: counts, bounds, levels, bytes per column group, what is absent
+/// Tell what a dataset holds: counts, bounds, levels, bytes per column, what is absent
 #[derive(Debug, Clone, Args)]
 pub struct InspectArgs {
     /// The dataset

@@ -78,7 +78,18 @@ pub struct GroupDescription {
     /// Name.
     pub name: String,
     /// Its columns, in order; `position` is the first of group 0.
-    pub columns: Vec<String>,
+    pub columns: Vec<ColumnDescription>,
+    /// Bytes over all nodes.
+    pub bytes: u64,
+    /// Bytes per element; 0 where there are none.
+    pub bytes_per_point: f64,
+}
+
+/// A column of a group.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ColumnDescription {
+    /// Attribute, or `position`.
+    pub name: String,
     /// Bytes over all nodes.
     pub bytes: u64,
     /// Bytes per element; 0 where there are none.
@@ -137,7 +148,7 @@ pub struct LevelDescription {
 pub fn describe<R: ReadAt>(dataset: &Dataset<R>) -> Result<Description> {
     let (manifest, header) = (dataset.manifest(), &dataset.boot().header);
     let nodes = dataset.hierarchy()?;
-    let payload_bytes = manifest.groups.iter().fold(0u64, |sum, g| sum.saturating_add(g.bytes));
+    let payload_bytes = manifest.groups.iter().fold(0u64, |sum, g| sum.saturating_add(g.bytes()));
     let bounds = manifest.bounds_world();
     let has = |name: &str| manifest.attribute(name).is_some();
     Ok(Description {
@@ -172,13 +183,18 @@ fn per_point(bytes: u64, manifest: &Manifest) -> f64 {
 
 fn groups(manifest: &Manifest) -> Vec<GroupDescription> {
     let describe = |(index, group): (usize, &GroupInfo)| {
-        let position = (index == 0).then(|| "position".to_owned());
-        let columns = manifest.columns_of(index).map(|a| a.name.clone());
+        let position = (index == 0).then_some("position");
+        let names = position.into_iter().chain(manifest.columns_of(index).map(|a| &*a.name));
+        let columns = names.zip(&group.columns).map(|(name, &bytes)| ColumnDescription {
+            name: name.to_owned(),
+            bytes,
+            bytes_per_point: per_point(bytes, manifest),
+        });
         GroupDescription {
             name: group.name.clone(),
-            columns: position.into_iter().chain(columns).collect(),
-            bytes: group.bytes,
-            bytes_per_point: per_point(group.bytes, manifest),
+            columns: columns.collect(),
+            bytes: group.bytes(),
+            bytes_per_point: per_point(group.bytes(), manifest),
         }
     };
     manifest.groups.iter().enumerate().map(describe).collect()

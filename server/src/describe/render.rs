@@ -72,23 +72,19 @@ fn bounds(d: &Description) -> String {
 }
 
 fn groups(d: &Description) -> String {
-    let mut rows = vec![["group", "bytes", "per point", "columns"].map(str::to_owned)];
+    let mut rows = vec![["group", "column", "bytes", "per point"].map(str::to_owned)];
+    let row = |group: &str, column: &str, bytes, per_point: f64| {
+        [group.to_owned(), column.to_owned(), count(bytes), format!("{per_point:.3}")]
+    };
     for group in &d.groups {
-        rows.push([
-            group.name.clone(),
-            count(group.bytes),
-            format!("{:.3}", group.bytes_per_point),
-            group.columns.join(", "),
-        ]);
+        rows.push(row(&group.name, "", group.bytes, group.bytes_per_point));
+        for column in &group.columns {
+            rows.push(row("", &column.name, column.bytes, column.bytes_per_point));
+        }
     }
     let index_per_point = if d.points == 0 { 0.0 } else { d.index_bytes as f64 / d.points as f64 };
-    rows.push([
-        "index".into(),
-        count(d.index_bytes),
-        format!("{index_per_point:.3}"),
-        "header, manifest, hierarchy".into(),
-    ]);
-    table([Align::Left, Align::Right, Align::Right, Align::Left], &rows)
+    rows.push(row("index", "", d.index_bytes, index_per_point));
+    table([Align::Left, Align::Left, Align::Right, Align::Right], &rows)
 }
 
 fn attributes(d: &Description) -> String {

@@ -78,8 +78,14 @@ impl Maker {
         let mut bounds = LatticeBox::EMPTY;
         let mut nodes = Vec::new();
         let mut payloads = [Vec::new(), Vec::new()];
+        let mut groups =
+            ["base", "more"].map(|name| GroupInfo { name: name.to_owned(), columns: Vec::new() });
+        groups[0].columns.push(0);
+        for group in attributes.iter().filter_map(Attribute::group) {
+            groups[group].columns.push(0);
+        }
         for &key in keys {
-            let (node, of_node) = self.node(key, &lattice, &attributes);
+            let (node, of_node) = self.node(key, &lattice, &attributes, &mut groups);
             bounds.merge(&node.bounds);
             for (all, one) in payloads.iter_mut().zip(of_node) {
                 all.push(one);
@@ -124,11 +130,7 @@ impl Maker {
             bounds,
             largest_rounding: 0.0,
             attributes,
-            groups: ["base", "more"]
-                .into_iter()
-                .zip(totals)
-                .map(|(name, bytes)| GroupInfo { name: name.to_owned(), bytes })
-                .collect(),
+            groups: groups.into(),
             crs: None,
             sources: Vec::new(),
         };
@@ -171,12 +173,13 @@ impl Maker {
         attributes
     }
 
-    /// A node without children and its payloads.
+    /// A node without children and its payloads; the bytes of its columns are added to `groups`.
     fn node(
         &mut self,
         key: NodeKey,
         lattice: &Lattice,
         attributes: &[Attribute],
+        groups: &mut [GroupInfo; 2],
     ) -> (Node, [Vec<u8>; 2]) {
         let bits = lattice.node_bits(key.level());
         let corner = lattice.node_min(key);
@@ -193,10 +196,15 @@ impl Maker {
 
         let mut payloads = [Vec::new(), Vec::new()];
         encode_positions(&mut payloads[0], &codes, bits).expect("positions");
+        groups[0].columns[0] += payloads[0].len() as u64;
+        let mut columns = [1, 0];
         for attribute in attributes {
             let Some(group) = attribute.group() else { continue };
             let values = self.values(attribute);
+            let before = payloads[group].len();
             encode_column(&mut payloads[group], attribute, &values).expect("a column");
+            groups[group].columns[columns[group]] += (payloads[group].len() - before) as u64;
+            columns[group] += 1;
         }
         let reference = |payload: &Vec<u8>| PayloadRef {
             offset: 0,
