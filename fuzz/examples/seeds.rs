@@ -47,19 +47,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         write_columns(&out.join(format!("columns/dataset_level_{level}")), &input)?;
     }
 
-    let scalars = [
-        ("u8", ScalarType::U8),
-        ("i8", ScalarType::I8),
-        ("u16", ScalarType::U16),
-        ("i16", ScalarType::I16),
-        ("u32", ScalarType::U32),
-        ("i32", ScalarType::I32),
-        ("u64", ScalarType::U64),
-        ("i64", ScalarType::I64),
-        ("f32", ScalarType::F32),
-        ("f64", ScalarType::F64),
-    ];
-    for (name, scalar) in scalars {
+    for scalar in ScalarType::ALL {
+        let name = format!("{scalar:?}").to_lowercase();
         for components in [1, 3] {
             let attributes = vec![attribute("a0", scalar, components, Domain::Element)];
             let path = out.join(format!("columns/{name}x{components}"));

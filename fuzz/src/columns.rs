@@ -6,18 +6,6 @@ use lodestream_protocol::{
 
 use crate::{leaf, manifest};
 
-const SCALARS: [ScalarType; 10] = [
-    ScalarType::U8,
-    ScalarType::I8,
-    ScalarType::U16,
-    ScalarType::I16,
-    ScalarType::U32,
-    ScalarType::I32,
-    ScalarType::U64,
-    ScalarType::I64,
-    ScalarType::F32,
-    ScalarType::F64,
-];
 const TEXEL: u8 = 1 << 7;
 const TEXTURE_SIZE: u8 = 1 << 6;
 const SCALAR_MASK: u8 = 0b1111;
@@ -55,7 +43,7 @@ impl<'a> ColumnsInput<'a> {
                     0 => format!("a{index}"),
                     _ => "texture_size".into(),
                 },
-                scalar: SCALARS[usize::from(kind & SCALAR_MASK) % SCALARS.len()],
+                scalar: ScalarType::ALL[usize::from(kind & SCALAR_MASK) % ScalarType::ALL.len()],
                 components,
                 domain: if kind & TEXEL == 0 { Domain::Element } else { Domain::Texel },
                 storage: Storage::Column { group: 0 },
@@ -92,7 +80,7 @@ impl<'a> ColumnsInput<'a> {
         let mut bytes =
             vec![self.manifest.lattice.side_bits, self.node.key.level(), p0, p1, p2, count];
         for attribute in stored {
-            let scalar = SCALARS.iter().position(|s| *s == attribute.scalar)?;
+            let scalar = ScalarType::ALL.iter().position(|s| *s == attribute.scalar)?;
             let size = if attribute.name == "texture_size" { TEXTURE_SIZE } else { 0 };
             let texel = if attribute.domain == Domain::Texel { TEXEL } else { 0 };
             bytes.push(u8::try_from(scalar).ok()? | size | texel);

@@ -61,16 +61,14 @@ fn wider(a: ScalarType, b: ScalarType) -> ScalarType {
     if a == b {
         return a;
     }
-    let float = |s| matches!(s, F32 | F64);
-    if float(a) || float(b) {
+    if !a.is_integer() || !b.is_integer() {
         let small = |s| matches!(s, F32 | U8 | I8 | U16 | I16);
         return if small(a) && small(b) { F32 } else { F64 };
     }
-    let signed = |s| matches!(s, I8 | I16 | I32 | I64);
     let size = a.size_bytes().max(b.size_bytes());
-    if signed(a) || signed(b) {
+    if a.is_signed() || b.is_signed() {
         // An unsigned type needs the next larger signed one.
-        let unsigned_size = [a, b].iter().filter(|&&s| !signed(s)).map(|s| s.size_bytes()).max();
+        let unsigned_size = [a, b].iter().filter(|s| !s.is_signed()).map(|s| s.size_bytes()).max();
         let size = size.max(unsigned_size.map_or(0, |s| 2 * s));
         return match size {
             1 => I8,
@@ -161,7 +159,7 @@ impl RowMap {
 
 impl Move {
     fn convert(&self, from: &[u8], to: &mut [u8]) {
-        use ScalarType::{F32, F64, I8, I16, I32, I64};
+        use ScalarType::{F32, F64};
         if self.stretch {
             to.copy_from_slice(&(u16::from(from[0]) * 257).to_le_bytes());
         } else if self.from_scalar == self.to_scalar {
@@ -172,8 +170,8 @@ impl Move {
             to.copy_from_slice(&(self.from_scalar.to_f64(from) as f32).to_le_bytes());
         } else {
             // A wider integer: the bytes, extended by the sign.
-            let negative = matches!(self.from_scalar, I8 | I16 | I32 | I64)
-                && from.last().is_some_and(|b| b & 0x80 != 0);
+            let negative =
+                self.from_scalar.is_signed() && from.last().is_some_and(|b| b & 0x80 != 0);
             to.fill(if negative { 0xff } else { 0 });
             to[..from.len()].copy_from_slice(from);
         }

@@ -29,6 +29,20 @@ pub enum ScalarType {
 }
 
 impl ScalarType {
+    /// Every type, in the order of their declaration.
+    pub const ALL: [Self; 10] = [
+        Self::U8,
+        Self::I8,
+        Self::U16,
+        Self::I16,
+        Self::U32,
+        Self::I32,
+        Self::U64,
+        Self::I64,
+        Self::F32,
+        Self::F64,
+    ];
+
     /// Size of one component in bytes.
     #[must_use]
     pub const fn size_bytes(self) -> usize {
@@ -45,20 +59,52 @@ impl ScalarType {
     /// `bytes` must hold [`size_bytes`](Self::size_bytes) bytes; missing ones read as zero.
     #[must_use]
     pub fn to_f64(self, bytes: &[u8]) -> f64 {
+        let bits = self.bits(bytes);
+        match self {
+            Self::U8 | Self::U16 | Self::U32 | Self::U64 => bits as f64,
+            Self::I8 | Self::I16 | Self::I32 | Self::I64 => self.extended(bits) as f64,
+            Self::F32 => f64::from(f32::from_bits(bits as u32)),
+            Self::F64 => f64::from_bits(bits),
+        }
+    }
+
+    /// Value of one little-endian component of an integer type; `None` for floats.
+    ///
+    /// `bytes` must hold [`size_bytes`](Self::size_bytes) bytes; missing ones read as zero.
+    #[must_use]
+    pub fn to_i128(self, bytes: &[u8]) -> Option<i128> {
+        let bits = self.bits(bytes);
+        match self {
+            _ if self.is_signed() => Some(self.extended(bits).into()),
+            _ if self.is_integer() => Some(bits.into()),
+            _ => None,
+        }
+    }
+
+    /// Whether it is no float.
+    #[must_use]
+    pub const fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// Whether it is an integer that can be below zero.
+    #[must_use]
+    pub const fn is_signed(self) -> bool {
+        matches!(self, Self::I8 | Self::I16 | Self::I32 | Self::I64)
+    }
+
+    /// The component's bytes, zeros above.
+    fn bits(self, bytes: &[u8]) -> u64 {
         let mut raw = [0u8; 8];
         let size = self.size_bytes().min(bytes.len());
         raw[..size].copy_from_slice(&bytes[..size]);
-        let bits = u64::from_le_bytes(raw);
-        let [b0, b1, b2, b3, ..] = raw;
-        match self {
-            Self::U8 | Self::U16 | Self::U32 | Self::U64 => bits as f64,
-            Self::I8 => f64::from(i8::from_le_bytes([b0])),
-            Self::I16 => f64::from(i16::from_le_bytes([b0, b1])),
-            Self::I32 => f64::from(i32::from_le_bytes([b0, b1, b2, b3])),
-            Self::I64 => i64::from_le_bytes(raw) as f64,
-            Self::F32 => f64::from(f32::from_le_bytes([b0, b1, b2, b3])),
-            Self::F64 => f64::from_le_bytes(raw),
-        }
+        u64::from_le_bytes(raw)
+    }
+
+    /// A signed component with its sign in all bits above.
+    const fn extended(self, bits: u64) -> i64 {
+        let above = u64::BITS as usize - 8 * self.size_bytes();
+        ((bits << above) as i64) >> above
     }
 }
 
@@ -148,5 +194,44 @@ impl Attribute {
     #[must_use]
     pub fn constant_storage(bytes: &[u8]) -> Storage {
         Storage::Constant { value: bytes.iter().map(|b| format!("{b:02x}")).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ScalarType::{self, F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
+
+    #[test]
+    fn components_of_every_type_are_read_with_their_sign() {
+        let cases: [(ScalarType, &[u8], f64, Option<i128>); 12] = [
+            (U8, &[255], 255.0, Some(255)),
+            (I8, &[255], -1.0, Some(-1)),
+            (U16, &[0, 128], 32_768.0, Some(32_768)),
+            (I16, &[0, 128], -32_768.0, Some(-32_768)),
+            (U32, &[255; 4], 4_294_967_295.0, Some(4_294_967_295)),
+            (I32, &[255; 4], -1.0, Some(-1)),
+            (U64, &[255; 8], 18_446_744_073_709_551_615.0, Some(i128::from(u64::MAX))),
+            (I64, &[255; 8], -1.0, Some(-1)),
+            (
+                I64,
+                &[0, 0, 0, 0, 0, 0, 0, 128],
+                -9.223_372_036_854_776e18,
+                Some(i128::from(i64::MIN)),
+            ),
+            (I16, &[5], 5.0, Some(5)),
+            (F32, &[0, 0, 0x20, 0xc0], -2.5, None),
+            (F64, &[0, 0, 0, 0, 0, 0, 4, 0xc0], -2.5, None),
+        ];
+        for (scalar, bytes, float, integer) in cases {
+            assert_eq!(scalar.to_f64(bytes), float, "{scalar:?}");
+            assert_eq!(scalar.to_i128(bytes), integer, "{scalar:?}");
+        }
+    }
+
+    #[test]
+    fn all_types_are_there_in_order() {
+        assert!(
+            ScalarType::ALL.iter().enumerate().all(|(index, &scalar)| scalar as usize == index)
+        );
     }
 }

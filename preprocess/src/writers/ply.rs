@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::{
     ExportBlock, ExportInfo, PointWriter,
-    source::{Source, integer, is_exact_as_f64, is_integer, is_per_point, range},
+    source::{Source, is_exact_as_f64, is_per_point, range},
     target::Target,
 };
 use crate::error::{Error, Result};
@@ -157,7 +157,7 @@ impl Layout {
         for component in 0..usize::from(*components) {
             let part = match (name.as_str(), components) {
                 ("color", 3) => ["red", "green", "blue"][component].to_owned(),
-                ("normal", 3) if !is_integer(*scalar) => ["nx", "ny", "nz"][component].to_owned(),
+                ("normal", 3) if !scalar.is_integer() => ["nx", "ny", "nz"][component].to_owned(),
                 (_, 1) => name.clone(),
                 _ => format!("{name}_{component}"),
             };
@@ -255,7 +255,7 @@ impl Step {
                 }
                 Change::Double(scalar) => {
                     for (out, bytes) in out.chunks_exact_mut(8).zip(value.chunks_exact(8)) {
-                        out.copy_from_slice(&(integer(scalar, bytes) as f64).to_le_bytes());
+                        out.copy_from_slice(&scalar.to_f64(bytes).to_le_bytes());
                     }
                 }
             }

@@ -59,22 +59,15 @@ pub(super) fn is_per_point(attribute: &Attribute) -> bool {
     attribute.domain == Domain::Element
 }
 
-/// Whether the type is one of the integers.
-pub(super) const fn is_integer(scalar: ScalarType) -> bool {
-    !matches!(scalar, ScalarType::F32 | ScalarType::F64)
-}
-
-/// The least and greatest value of an integer type, as floats; inexact for 64 bits.
+/// The least and greatest value of a type, as floats; inexact for 64 bits.
 pub(super) fn limits(scalar: ScalarType) -> (f64, f64) {
     let bits = 8 * scalar.size_bytes() as i32;
-    match scalar {
-        ScalarType::U8 | ScalarType::U16 | ScalarType::U32 | ScalarType::U64 => {
-            (0.0, f64::from(bits).exp2() - 1.0)
-        }
-        ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64 => {
-            (-f64::from(bits - 1).exp2(), f64::from(bits - 1).exp2() - 1.0)
-        }
-        ScalarType::F32 | ScalarType::F64 => (f64::NEG_INFINITY, f64::INFINITY),
+    if scalar.is_signed() {
+        (-f64::from(bits - 1).exp2(), f64::from(bits - 1).exp2() - 1.0)
+    } else if scalar.is_integer() {
+        (0.0, f64::from(bits).exp2() - 1.0)
+    } else {
+        (f64::NEG_INFINITY, f64::INFINITY)
     }
 }
 
@@ -92,23 +85,6 @@ pub(super) fn range(attribute: &Attribute) -> (f64, f64) {
     let least = min.iter().copied().fold(f64::INFINITY, f64::min);
     let greatest = max.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     (least, greatest)
-}
-
-/// The value of one integer component; zero for floats, which callers keep away.
-pub(super) fn integer(scalar: ScalarType, bytes: &[u8]) -> i128 {
-    let mut raw = [0; 8];
-    raw[..scalar.size_bytes()].copy_from_slice(&bytes[..scalar.size_bytes()]);
-    let [b0, b1, b2, b3, ..] = raw;
-    match scalar {
-        ScalarType::U8 | ScalarType::U16 | ScalarType::U32 | ScalarType::U64 => {
-            i128::from(u64::from_le_bytes(raw))
-        }
-        ScalarType::I8 => i128::from(i8::from_le_bytes([b0])),
-        ScalarType::I16 => i128::from(i16::from_le_bytes([b0, b1])),
-        ScalarType::I32 => i128::from(i32::from_le_bytes([b0, b1, b2, b3])),
-        ScalarType::I64 => i128::from(i64::from_le_bytes(raw)),
-        ScalarType::F32 | ScalarType::F64 => 0,
-    }
 }
 
 /// Whether 64-bit integers of this attribute are exact as binary64.
@@ -137,17 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn integers_of_every_type_are_read_with_their_sign() {
-        for (scalar, bytes, value) in [
-            (ScalarType::U8, vec![255], 255),
-            (ScalarType::I8, vec![255], -1),
-            (ScalarType::I16, vec![0, 128], -32768),
-            (ScalarType::I32, vec![255; 4], -1),
-            (ScalarType::U64, vec![255; 8], i128::from(u64::MAX)),
-            (ScalarType::I64, vec![255; 8], -1),
-        ] {
-            assert_eq!(integer(scalar, &bytes), value, "{scalar:?}");
-        }
+    fn limits_are_those_of_the_type() {
         assert_eq!(limits(ScalarType::I16), (-32768.0, 32767.0));
         assert_eq!(limits(ScalarType::U8), (0.0, 255.0));
     }

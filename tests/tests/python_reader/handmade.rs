@@ -46,19 +46,6 @@ struct Maker {
     seed: u64,
 }
 
-const TYPES: [ScalarType; 10] = [
-    ScalarType::U8,
-    ScalarType::I8,
-    ScalarType::U16,
-    ScalarType::I16,
-    ScalarType::U32,
-    ScalarType::I32,
-    ScalarType::U64,
-    ScalarType::I64,
-    ScalarType::F32,
-    ScalarType::F64,
-];
-
 /// Texels of every rectangle: columns, rows.
 const TEXTURE: [u32; 2] = [3, 2];
 
@@ -163,7 +150,7 @@ impl Maker {
         }
         add("color", ScalarType::U16, 3, Domain::Element, column(0));
         add("color_8", ScalarType::U8, 3, Domain::Element, column(1));
-        for scalar in TYPES {
+        for scalar in ScalarType::ALL {
             add(&format!("one_{scalar:?}"), scalar, 1, Domain::Element, column(1));
             add(&format!("two_{scalar:?}"), scalar, 2, Domain::Element, column(1));
         }

@@ -16,20 +16,6 @@ pub(crate) const NAME_BYTES: usize = 32;
 /// Most undescribed bytes of a record that are kept, as one attribute.
 const MOST_UNDESCRIBED: usize = 64;
 
-/// The types of one component, by their number less one; plus 10 and 20 for two and three.
-pub(crate) const SCALARS: [ScalarType; 10] = [
-    ScalarType::U8,
-    ScalarType::I8,
-    ScalarType::U16,
-    ScalarType::I16,
-    ScalarType::U32,
-    ScalarType::I32,
-    ScalarType::U64,
-    ScalarType::I64,
-    ScalarType::F32,
-    ScalarType::F64,
-];
-
 /// An attribute in the extra bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct ExtraAttribute {
@@ -88,7 +74,7 @@ impl ExtraBytes {
         let (scalar, components) = match kind {
             // Undocumented: as many bytes as `options` says.
             0 => (ScalarType::U8, usize::from(options)),
-            1..=30 => (SCALARS[usize::from(kind - 1) % 10], usize::from(kind - 1) / 10 + 1),
+            1..=30 => (scalar_of(kind), usize::from(kind - 1) / 10 + 1),
             _ => {
                 self.left_out.push(format!("extra bytes {name:?}: type {kind} is not known"));
                 return None;
@@ -167,11 +153,9 @@ impl ExtraBytes {
         if options & HAS_NO_DATA != 0 {
             let raw: [u8; 8] = *descriptor[40..].first_chunk().expect("192 bytes");
             // Eight bytes whatever the type: integers are widened, floats are f64.
-            let value = match SCALARS[usize::from(kind - 1) % 10] {
+            let value = match scalar_of(kind) {
                 ScalarType::F32 | ScalarType::F64 => f64::from_le_bytes(raw).to_string(),
-                ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64 => {
-                    i64::from_le_bytes(raw).to_string()
-                }
+                scalar if scalar.is_signed() => i64::from_le_bytes(raw).to_string(),
                 _ => u64::from_le_bytes(raw).to_string(),
             };
             self.left_out.push(format!(
@@ -179,6 +163,22 @@ impl ExtraBytes {
             ));
         }
     }
+}
+
+/// The number by which a descriptor names the type of one component; plus 10 and 20 for two and three.
+pub(crate) fn number_of(scalar: ScalarType) -> u8 {
+    // Our order is that of the specification, which counts from 1.
+    let (_, number) = ScalarType::ALL
+        .into_iter()
+        .zip(1..)
+        .find(|(other, _)| *other == scalar)
+        .expect("the list has every type");
+    number
+}
+
+/// The type that a number from 1 to 30 names.
+fn scalar_of(number: u8) -> ScalarType {
+    ScalarType::ALL[usize::from(number.saturating_sub(1)) % ScalarType::ALL.len()]
 }
 
 /// Whether a name means something to readers of a dataset that such extra bytes are not.

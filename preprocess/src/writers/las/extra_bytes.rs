@@ -2,7 +2,7 @@
 
 use lodestream_protocol::{Attribute, ScalarType};
 
-use crate::readers::las::extra_bytes::{DESCRIPTOR_BYTES, NAME_BYTES, SCALARS};
+use crate::readers::las::extra_bytes::{DESCRIPTOR_BYTES, NAME_BYTES, number_of};
 
 /// What some extra bytes are.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,8 +19,7 @@ impl Descriptor {
     /// component by component.
     pub(super) fn add(all: &mut Vec<Self>, attribute: &Attribute, notes: &mut Vec<String>) {
         let Attribute { name, scalar, components, .. } = attribute;
-        let number = SCALARS.iter().zip(1u8..).find(|(other, _)| *other == scalar);
-        let number = number.map(|(_, number)| number).expect("every type has a number");
+        let number = number_of(*scalar);
         match (components, scalar) {
             (1..=3, _) => {
                 all.push(Self::named(all, name, number + 10 * (components - 1), 0, notes));

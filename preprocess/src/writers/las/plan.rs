@@ -9,7 +9,7 @@ use super::extra_bytes::Descriptor;
 use crate::{
     error::{Error, Result},
     readers::las::point_format::{Field, Place, WAVE_FIELDS, fields, is_extended},
-    writers::source::{is_integer, is_per_point, limits, range},
+    writers::source::{is_per_point, limits, range},
 };
 
 /// A format with every extended field, to ask what such fields can hold.
@@ -165,7 +165,7 @@ fn change_for(attribute: &Attribute, field: &Field) -> Option<Change> {
         Place::Bytes if from == field.scalar => Some(Change::Copy { len: attribute.value_bytes() }),
         Place::Bytes => {
             let to = field.scalar;
-            if !is_integer(from) || !is_integer(to) {
+            if !from.is_integer() || !to.is_integer() {
                 return None;
             }
             let is_color = field.name == "color" && from == ScalarType::U8;
@@ -180,7 +180,7 @@ fn change_for(attribute: &Attribute, field: &Field) -> Option<Change> {
         }
         Place::Bits { shift, bits } => {
             let greatest = f64::from((1u16 << bits) - 1);
-            (is_integer(from) && lies_in(attribute, (0.0, greatest))).then_some(Change::Bits {
+            (from.is_integer() && lies_in(attribute, (0.0, greatest))).then_some(Change::Bits {
                 from,
                 shift,
                 bits,

@@ -6,10 +6,7 @@ use rayon::prelude::*;
 use super::plan::{Change, Plan, Step};
 use crate::{
     error::{Error, Result},
-    writers::{
-        ExportBlock,
-        source::{Source, integer},
-    },
+    writers::{ExportBlock, source::Source},
 };
 
 /// Points that a thread turns into records at a time.
@@ -142,7 +139,7 @@ fn run(
         }
         Change::Integers { from, to, components, factor } => {
             let size = to.size_bytes();
-            let lowest = if is_signed(to) { -(1i128 << (8 * size - 1)) } else { 0 };
+            let lowest = if to.is_signed() { -(1i128 << (8 * size - 1)) } else { 0 };
             let highest = lowest + (1i128 << (8 * size)) - 1;
             for (i, record) in points {
                 let values = source.value(first + i).chunks_exact(from.size_bytes());
@@ -171,8 +168,9 @@ fn run(
     Ok(())
 }
 
-const fn is_signed(scalar: ScalarType) -> bool {
-    matches!(scalar, ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64)
+/// The value of a component of which the plan made sure that it is an integer.
+fn integer(scalar: ScalarType, bytes: &[u8]) -> i128 {
+    scalar.to_i128(bytes).expect("floats are copied or go to the extra bytes")
 }
 
 /// Counts points by the return number that has been written.
