@@ -19,17 +19,60 @@ pub enum Footprint {
     Square,
     /// A circle facing the picture.
     Circle,
+    /// A cone whose tip faces the picture.
+    Cone,
+    /// A paraboloid whose tip faces the picture.
+    Paraboloid,
+    /// The paraboloid as 8 triangles.
+    Paraboloid8,
+    /// The paraboloid as 16 triangles.
+    Paraboloid16,
+    /// The paraboloid as 32 triangles.
+    Paraboloid32,
+    /// The paraboloid as 48 triangles.
+    Paraboloid48,
+    /// A disc across the normal.
+    Disc,
+    /// An ellipse spanned by its half axes.
+    Ellipse,
 }
 
 impl Footprint {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Point, Self::Square, Self::Circle];
+    pub const ALL: [Self; 11] = [
+        Self::Point,
+        Self::Square,
+        Self::Circle,
+        Self::Cone,
+        Self::Paraboloid,
+        Self::Paraboloid8,
+        Self::Paraboloid16,
+        Self::Paraboloid32,
+        Self::Paraboloid48,
+        Self::Disc,
+        Self::Ellipse,
+    ];
+
+    /// Vertices on each ring of the meshes that stand for paraboloids, from the tip outwards; empty
+    /// for what is no mesh. Ring `i` of `n` (from 1) has radius and depth `r = i / n`, `r²`, its
+    /// first vertex to the right of the tip. The tip and the first ring are a fan; between two
+    /// rings of equally many vertices each step is two triangles, between one and its double three.
+    #[must_use]
+    pub const fn rings(self) -> &'static [u32] {
+        match self {
+            Self::Paraboloid8 => &[8],
+            Self::Paraboloid16 => &[4, 8],
+            Self::Paraboloid32 => &[8, 16],
+            Self::Paraboloid48 => &[8, 8, 16],
+            _ => &[],
+        }
+    }
 
     const fn part(self) -> &'static str {
         match self {
             Self::Point => include_str!("footprint_point.wgsl"),
             Self::Square => include_str!("footprint_square.wgsl"),
-            Self::Circle => include_str!("footprint_circle.wgsl"),
+            _ => include_str!("footprint_circle.wgsl"),
         }
     }
 }

@@ -24,7 +24,7 @@ use serde::Serialize;
 use crate::{
     camera::{Camera, Projection},
     engine::{Engine, EngineConfig, View},
-    render::{ColorMode, RenderError, RenderSettings, Renderer, Scene, Splat, SplatSize},
+    render::{ColorMode, RenderError, RenderSettings, Renderer, Scene},
     source::Source,
 };
 
@@ -214,18 +214,9 @@ fn visit(
     engine.set_view(View { camera, size_px: SIZE_PX });
     let plan = engine.wait_settled(PATIENCE)?;
     let phase = engine.stats().since_view;
-    let settings = RenderSettings {
-        size_px: SIZE_PX,
-        camera,
-        splat: Splat::Circle,
-        splat_size: SplatSize::Pixels(3.0),
-        color: if clouds[0].attribute("color").is_some() {
-            ColorMode::Rgb
-        } else {
-            ColorMode::Elevation
-        },
-        background: [255, 255, 255],
-    };
+    let color =
+        if clouds[0].attribute("color").is_some() { ColorMode::Rgb } else { ColorMode::Elevation };
+    let settings = RenderSettings { color, ..RenderSettings::new(SIZE_PX, camera) };
     let started = Instant::now();
     let frame =
         renderer.render(&Scene { clouds, nodes: &plan.nodes }, &settings, &mut tell_fallback)?;

@@ -14,6 +14,8 @@ pub struct DrawNode {
     pub cloud: usize,
     /// The node.
     pub key: NodeKey,
+    /// Distance between neighbouring points of the node, world units.
+    pub spacing: f32,
     /// Its elements: positions, and the columns that have arrived. Columns of further groups may
     /// still be missing while [`FramePlan::settled`] is false.
     pub points: Arc<NodePoints>,

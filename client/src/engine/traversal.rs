@@ -158,11 +158,15 @@ impl Traversal {
             ..FramePlan::default()
         };
         for &i in &drawing.drawn {
-            let id = self.selection.picks[i].id;
-            if let Some(points) = self.store.points(id) {
+            let pick = &self.selection.picks[i];
+            if let Some(points) = self.store.points(pick.id) {
                 plan.points += points.positions.len() as u64;
-                let points = Arc::clone(points);
-                plan.nodes.push(DrawNode { cloud: id.cloud, key: id.key, points });
+                plan.nodes.push(DrawNode {
+                    cloud: pick.id.cloud,
+                    key: pick.id.key,
+                    spacing: pick.node.spacing,
+                    points: Arc::clone(points),
+                });
             }
         }
         let mut pieces = self.missing_pages();

@@ -1,8 +1,9 @@
 //! From attributes to colours, for one cloud: the one place that both renderers ask.
 
+use glam::DVec3;
 use lodestream_protocol::{Attribute, Lattice, Manifest, NodePoints, ScalarType};
 
-use crate::render::{ramp::Ramp, scene::Surroundings, settings::ColorMode};
+use crate::render::{ramp::Ramp, scene::Surroundings, settings::ColorMode, surface::NodeSurface};
 
 /// Colour of points whose cloud has nothing to colour them by.
 const NEUTRAL: [u8; 3] = [200; 3];
@@ -10,7 +11,7 @@ const NEUTRAL: [u8; 3] = [200; 3];
 /// Where the colours of one cloud come from.
 ///
 /// A cloud without the attribute that a [`ColorMode`] names is coloured by the next best it has:
-/// `Rgb` falls back to `Intensity`, and `Intensity` to `Elevation`.
+/// `Rgb` falls back to `Intensity`; `Intensity`, `Classification` and `Normal` to `Elevation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Coloring {
     /// Per point: red, green, blue of an attribute.
@@ -36,10 +37,23 @@ pub enum Coloring {
         /// Value at the ramp's light end.
         max: f64,
     },
+    /// Per point: an attribute's first component is a class of the LAS specification.
+    Classification {
+        /// Index into [`Manifest::attributes`].
+        attribute: usize,
+        /// Type of a component.
+        scalar: ScalarType,
+        /// Bytes of a value, all components.
+        value_bytes: usize,
+    },
+    /// Per point: by the direction of its normal.
+    Normal,
     /// By height.
     Elevation,
     /// By the node's level.
     Level,
+    /// By how many points fall on a pixel.
+    Density,
     /// The same for all points of the cloud.
     Constant([u8; 3]),
 }
@@ -51,6 +65,9 @@ impl Coloring {
         match mode {
             ColorMode::Rgb => Self::rgb(manifest).or_else(|| Self::intensity(manifest)),
             ColorMode::Intensity => Self::intensity(manifest),
+            ColorMode::Classification => Self::classification(manifest),
+            ColorMode::Normal => has_normals(manifest).then_some(Self::Normal),
+            ColorMode::Density => Some(Self::Density),
             ColorMode::Elevation => Some(Self::Elevation),
             ColorMode::Level => Some(Self::Level),
         }
@@ -89,20 +106,27 @@ impl Coloring {
         })
     }
 
-    /// The attribute that this colouring reads per point, if it does.
+    fn classification(manifest: &Manifest) -> Option<Self> {
+        let (attribute, info) = find(manifest, ColorMode::Classification)?;
+        let (scalar, value_bytes) = (info.scalar, info.value_bytes());
+        Some(match info.constant() {
+            Some(class) => Self::Constant(class_color(scalar.to_f64(&class))),
+            None => Self::Classification { attribute, scalar, value_bytes },
+        })
+    }
+
+    /// The attribute that this colouring reads per point, if it does. Normals are not counted: they
+    /// are [of the surface](crate::render::RenderSettings::attributes).
     #[must_use]
     pub const fn attribute(&self) -> Option<usize> {
         match self {
-            Self::Rgb { attribute, .. } | Self::Intensity { attribute, .. } => Some(*attribute),
-            Self::Elevation | Self::Level | Self::Constant(_) => None,
+            Self::Rgb { attribute, .. }
+            | Self::Intensity { attribute, .. }
+            | Self::Classification { attribute, .. } => Some(*attribute),
+            Self::Normal | Self::Elevation | Self::Level | Self::Density | Self::Constant(_) => {
+                None
+            }
         }
-    }
-
-    /// The column group beyond the first that a view with this colouring needs, if any.
-    #[must_use]
-    pub fn group(&self, manifest: &Manifest) -> Option<usize> {
-        let attribute = manifest.attributes.get(self.attribute()?)?;
-        attribute.group().filter(|group| *group != 0)
     }
 
     /// The colouring, for a user.
@@ -111,8 +135,11 @@ impl Coloring {
         match self {
             Self::Rgb { .. } => "rgb",
             Self::Intensity { .. } => "intensity",
+            Self::Classification { .. } => "classification",
+            Self::Normal => "normal",
             Self::Elevation => "elevation",
             Self::Level => "level",
+            Self::Density => "density",
             Self::Constant(_) => "constant",
         }
     }
@@ -123,9 +150,29 @@ impl Coloring {
         matches!(
             (self, mode),
             (Self::Intensity { .. } | Self::Elevation, ColorMode::Rgb)
-                | (Self::Elevation, ColorMode::Intensity)
+                | (
+                    Self::Elevation,
+                    ColorMode::Intensity | ColorMode::Classification | ColorMode::Normal
+                )
         )
     }
+}
+
+fn has_normals(manifest: &Manifest) -> bool {
+    let has = |name| manifest.attribute(name).is_some_and(|a| a.components == 3);
+    has("normal") || (has("axis_u") && has("axis_v"))
+}
+
+/// The colour of a class: beyond 255 there are none.
+fn class_color(class: f64) -> [u8; 3] {
+    // The cast saturates, and takes NaN for 0.
+    Ramp::Class.color(class as u8)
+}
+
+/// The colour of a direction.
+fn direction_color(normal: Option<DVec3>) -> [u8; 3] {
+    let byte = |c: f64| ((0.5 * c + 0.5) * 255.0).round() as u8;
+    normal.map_or(NEUTRAL, |n| n.to_array().map(byte))
 }
 
 /// The attribute that a mode needs, with its index.
@@ -141,6 +188,10 @@ pub(crate) enum NodeColor<'a> {
     Rgb { column: &'a [u8], scalar: ScalarType, shift: u8 },
     /// A column of values for the intensity ramp.
     Intensity { column: &'a [u8], scalar: ScalarType, value_bytes: usize, min: f64, max: f64 },
+    /// A column of classes.
+    Class { column: &'a [u8], scalar: ScalarType, value_bytes: usize },
+    /// By the normals.
+    Normal(NodeSurface<'a>),
     /// Place on the elevation ramp of the node's lowest corner, and the rise per lattice unit.
     Elevation { at_corner: f64, per_unit: f64 },
     /// The same for all points.
@@ -155,6 +206,7 @@ impl<'a> NodeColor<'a> {
         cloud: usize,
         lattice: &Lattice,
         points: &'a NodePoints,
+        surface: &NodeSurface<'a>,
     ) -> Self {
         let column = |attribute| points.column(attribute).map(|c| c.bytes.as_slice());
         let colored = match around.colorings[cloud] {
@@ -163,6 +215,10 @@ impl<'a> NodeColor<'a> {
             }
             Coloring::Intensity { attribute, scalar, value_bytes, min, max } => column(attribute)
                 .map(|column| Self::Intensity { column, scalar, value_bytes, min, max }),
+            Coloring::Classification { attribute, scalar, value_bytes } => {
+                column(attribute).map(|column| Self::Class { column, scalar, value_bytes })
+            }
+            Coloring::Normal => Some(Self::Normal(*surface)),
             Coloring::Elevation => around.bounds.map(|(low, high)| {
                 let corner = lattice.node_min(points.key).map(f64::from);
                 let height = lattice.world_f64(corner)[2] - low.z;
@@ -181,6 +237,8 @@ impl<'a> NodeColor<'a> {
                 Some(Self::Constant(Ramp::Level.color(step)))
             }
             Coloring::Constant(color) => Some(Self::Constant(color)),
+            // Counted, not coloured.
+            Coloring::Density => None,
         };
         colored.unwrap_or(Self::Constant(NEUTRAL))
     }
@@ -190,6 +248,8 @@ impl<'a> NodeColor<'a> {
         match *self {
             Self::Rgb { column, scalar, shift } => rgb_at(column, index, scalar, shift),
             Self::Intensity { .. } => Ramp::Intensity.color(self.intensity_step(index)),
+            Self::Class { .. } => Ramp::Class.color(self.class(index)),
+            Self::Normal(surface) => direction_color(surface.normal(index)),
             Self::Elevation { at_corner, per_unit } => {
                 Ramp::Elevation.color(Ramp::step(at_corner + per_unit * f64::from(z)))
             }
@@ -203,6 +263,13 @@ impl<'a> NodeColor<'a> {
         let start = index * value_bytes;
         let value = column.get(start..start + value_bytes).map_or(min, |v| scalar.to_f64(v));
         Ramp::step((value - min) / (max - min))
+    }
+
+    /// The class of point `index`; 0 where colours are not by class.
+    pub fn class(&self, index: usize) -> u8 {
+        let Self::Class { column, scalar, value_bytes } = *self else { return 0 };
+        let start = index * value_bytes;
+        column.get(start..start + value_bytes).map_or(0, |v| scalar.to_f64(v) as u8)
     }
 }
 

@@ -15,7 +15,10 @@ mod ramp;
 mod renderer;
 mod scene;
 mod settings;
+mod size;
 mod ssim;
+mod surface;
+mod tree;
 mod view;
 
 #[cfg(test)]
@@ -34,10 +37,11 @@ pub use picture::Picture;
 pub use renderer::Renderer;
 pub use scene::Scene;
 pub use settings::{
-    ColorMode, LARGEST_SIDE_PX, LARGEST_SPLAT_PX, RenderSettings, SMALLEST_SPLAT_PX, Splat,
-    SplatSize,
+    ColorMode, EyeDome, LARGEST_SIDE_PX, LARGEST_SPLAT_PX, RenderSettings, SMALLEST_SPLAT_PX,
+    Shading, SizeLimits, Splat, SplatSize,
 };
 pub use ssim::ssim;
+pub use tree::VisibleTree;
 
 pub use crate::engine::DrawNode;
 

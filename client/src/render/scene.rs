@@ -7,7 +7,7 @@ use lodestream_protocol::{Manifest, NodeKey};
 
 use crate::{
     engine::DrawNode,
-    render::{Coloring, RenderError, settings::ColorMode},
+    render::{Coloring, RenderError, VisibleTree, settings::ColorMode},
 };
 
 /// Where two points of the same pixel have the same depth, the one that comes first in this order
@@ -39,6 +39,11 @@ impl<'a> Scene<'a> {
         let mut nodes: Vec<_> = self.nodes.iter().collect();
         nodes.sort_by_key(|node| order(node));
         Ok(nodes)
+    }
+
+    /// The drawn nodes as sizes look them up.
+    pub(crate) fn tree(&self) -> VisibleTree {
+        VisibleTree::of(self.nodes.iter().map(|node| (node.cloud, node.key, node.spacing)))
     }
 }
 

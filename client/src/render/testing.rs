@@ -130,7 +130,12 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
                 Column { attribute: 1, bytes: intensities.collect() },
             ],
         };
-        DrawNode { cloud: 0, key, points: Arc::new(node) }
+        DrawNode {
+            cloud: 0,
+            key,
+            spacing: manifest.spacing_world(key.level()) as f32,
+            points: Arc::new(node),
+        }
     });
     TestScene { nodes: nodes.collect(), clouds: vec![Arc::new(manifest)] }
 }

@@ -99,14 +99,7 @@ fn looking_at_landscape() -> Camera {
 }
 
 fn settings(camera: Camera) -> RenderSettings {
-    RenderSettings {
-        size_px: [320, 200],
-        camera,
-        splat: Splat::Circle,
-        splat_size: SplatSize::Pixels(3.0),
-        color: ColorMode::Rgb,
-        background: BACKGROUND,
-    }
+    RenderSettings { background: BACKGROUND, ..RenderSettings::new([320, 200], camera) }
 }
 
 /// One point at lattice (2, 2, 2) of a lattice of whole units, seen from 10 units away along y.
@@ -535,7 +528,8 @@ fn a_cloud_without_the_attribute_is_drawn_by_what_it_has() {
 }
 
 fn truth(scene: &Scene, settings: &RenderSettings, samples: u32) -> Picture {
-    let mut truth = TruthRenderer::new(settings, scene.clouds, samples).expect("possible");
+    let mut truth =
+        TruthRenderer::new(settings, scene.clouds, scene.tree(), samples).expect("possible");
     for node in scene.nodes {
         truth.add_node(node.clone()).expect("a node of the scene");
     }
@@ -575,8 +569,8 @@ fn the_truth_averages_its_samples() {
 fn the_truth_refuses_sample_counts_that_cannot_be() {
     let (scene, settings) = one_point();
     for samples in [0, 17] {
-        assert!(TruthRenderer::new(&settings, &scene.clouds, samples).is_err());
+        assert!(TruthRenderer::new(&settings, &scene.clouds, Default::default(), samples).is_err());
     }
     let large = RenderSettings { size_px: [16_384, 16_384], ..settings };
-    assert!(TruthRenderer::new(&large, &scene.clouds, 4).is_err());
+    assert!(TruthRenderer::new(&large, &scene.clouds, Default::default(), 4).is_err());
 }

@@ -13,7 +13,7 @@ use lodestream_protocol::{Lattice, NodeKey};
 
 use crate::{
     camera::Projection,
-    render::settings::{LARGEST_SPLAT_PX, RenderSettings, SMALLEST_SPLAT_PX, Splat, SplatSize},
+    render::settings::{RenderSettings, SizeLimits, Splat, SplatSize},
 };
 
 /// The near plane's distance as a part of the farthest distance in the scene. A point nearer than
@@ -36,10 +36,8 @@ pub(crate) struct View {
     pub near: f64,
     /// 0 in perspective; `near` in an orthographic view, which so begins at the eye's plane.
     pub depth_bias: f64,
-    /// Splat size: `size_px + size_world_px / w`, within the two limits.
+    /// Splat size where it is in pixels, else 0.
     pub size_px: f64,
-    /// See `size_px`.
-    pub size_world_px: f64,
     /// Least splat size.
     pub smallest_size_px: f64,
     /// Largest splat size.
@@ -55,8 +53,8 @@ pub(crate) struct Projected {
     pub y: f64,
     /// Along the view direction, world units; not negative.
     pub distance: f64,
-    /// Splat size in pixels.
-    pub size: f64,
+    /// Pixels per world unit across the view at that distance.
+    pub scale: f64,
 }
 
 /// A node's lattice in view space: `origin + q.x * step.x + q.y * step.y + q.z * step.z`.
@@ -78,10 +76,12 @@ impl View {
         let near = (farthest * NEAR_OF_FARTHEST).max(f64::from(f32::MIN_POSITIVE) * 1e6);
         let perspective = matches!(camera.projection, Projection::Perspective { .. });
         let px_per_world = camera.pixels_per_world(1.0, settings.size_px[1]) * samples_f;
-        let (size_px, size_world_px) = match (settings.splat, settings.splat_size) {
-            (Splat::Point, _) => (0.0, 0.0),
-            (_, SplatSize::Pixels(pixels)) => (f64::from(pixels) * samples_f, 0.0),
-            (_, SplatSize::World(world)) => (0.0, world * px_per_world),
+        let SizeLimits { min_px, max_px } = settings.size_limits;
+        let is_point = settings.splat == Splat::Point;
+        let [smallest, largest] = if is_point { [1.0; 2] } else { [min_px, max_px] };
+        let size_px = match settings.splat_size {
+            SplatSize::Pixels(pixels) => f64::from(pixels) * samples_f,
+            _ => 0.0,
         };
         // Of Camera::basis, with the third axis turned to point into the picture.
         let basis = camera.basis();
@@ -94,9 +94,8 @@ impl View {
             near,
             depth_bias: if perspective { 0.0 } else { near },
             size_px,
-            size_world_px,
-            smallest_size_px: SMALLEST_SPLAT_PX * samples_f,
-            largest_size_px: LARGEST_SPLAT_PX * samples_f,
+            smallest_size_px: smallest * samples_f,
+            largest_size_px: largest * samples_f,
         }
     }
 
@@ -111,13 +110,23 @@ impl View {
         }
         let w = if self.perspective { view.z } else { 1.0 };
         let scale = self.px_per_world / w;
-        let size = self.size_px + self.size_world_px / w;
         Some(Projected {
             x: self.half_size_px.x + view.x * scale,
             y: self.half_size_px.y - view.y * scale,
             distance: view.z,
-            size: size.clamp(self.smallest_size_px, self.largest_size_px),
+            scale,
         })
+    }
+
+    /// Size in pixels of a splat of `world` units (0 where sizes are in pixels) at a place.
+    #[inline]
+    pub fn size(&self, at: &Projected, world: f64) -> f64 {
+        (self.size_px + world * at.scale).clamp(self.smallest_size_px, self.largest_size_px)
+    }
+
+    /// A direction in view space.
+    pub fn direction(&self, world: DVec3) -> DVec3 {
+        self.view_from_world * world
     }
 
     /// The eye in lattice units relative to a node's lowest corner.
@@ -154,22 +163,16 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{camera::Camera, render::settings::ColorMode};
+    use crate::camera::Camera;
 
     fn settings(eye: DVec3) -> RenderSettings {
-        RenderSettings {
-            size_px: [200, 100],
-            camera: Camera {
-                eye,
-                target: eye + DVec3::Y,
-                up: DVec3::Z,
-                projection: Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 },
-            },
-            splat: Splat::Square,
-            splat_size: SplatSize::World(0.5),
-            color: ColorMode::Level,
-            background: [0; 3],
-        }
+        let camera = Camera {
+            eye,
+            target: eye + DVec3::Y,
+            up: DVec3::Z,
+            projection: Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 },
+        };
+        RenderSettings::new([200, 100], camera)
     }
 
     #[test]
@@ -183,7 +186,9 @@ mod tests {
         assert!((seen.x - (100.0 + 50.0 / 4.0)).abs() < 1e-12, "{seen:?}");
         assert!((seen.y - (50.0 - 50.0 * 2.0 / 4.0)).abs() < 1e-12, "{seen:?}");
         assert!((seen.distance - 4.0).abs() < 1e-12);
-        assert!((seen.size - 0.5 * 50.0 / 4.0).abs() < 1e-12);
+        let world = RenderSettings { splat_size: SplatSize::World(0.5), ..settings(DVec3::ZERO) };
+        let size = View::new(&world, 1, 1000.0).size(&seen, 0.5);
+        assert!((size - 0.5 * 50.0 / 4.0).abs() < 1e-12);
         assert_eq!(view.project(-place), None);
     }
 

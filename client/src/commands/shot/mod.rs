@@ -126,13 +126,13 @@ impl ShotArgs {
         clouds: &[Arc<Manifest>],
     ) -> anyhow::Result<RenderSettings> {
         let [width, height] = self.size.map(f64::from);
+        let camera = camera.unwrap_or_else(|| overview(clouds, width / height));
         let settings = RenderSettings {
-            size_px: self.size,
-            camera: camera.unwrap_or_else(|| overview(clouds, width / height)),
             splat: self.splat,
             splat_size: self.splat_size,
             color: self.color,
             background: BACKGROUND,
+            ..RenderSettings::new(self.size, camera)
         };
         settings.check()?;
         Ok(settings)

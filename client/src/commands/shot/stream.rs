@@ -52,8 +52,9 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
     let clouds: Vec<_> = boots.iter().map(|boot| Arc::new(boot.manifest.clone())).collect();
     let settings = args.settings(camera, &clouds)?;
     let colorings = args.colorings(&clouds);
-    let needed = colorings.iter().zip(&clouds).filter_map(|(coloring, cloud)| {
-        cloud.attributes.get(coloring.attribute()?).map(|attribute| attribute.name.clone())
+    let needed = clouds.iter().flat_map(|cloud| {
+        let name = |a: usize| cloud.attributes[a].name.clone();
+        settings.attributes(cloud).into_iter().map(name).collect::<Vec<_>>()
     });
     engine.set_attributes(needed.collect());
     engine.set_view(View { camera: settings.camera, size_px: settings.size_px });

@@ -18,7 +18,7 @@ use super::{Shot, ShotArgs, ShotReport};
 use crate::{
     camera::Camera,
     engine::DrawNode,
-    render::{Coloring, FrameStatistics, TruthRenderer},
+    render::{Coloring, FrameStatistics, TruthRenderer, VisibleTree},
     source::{BlockingSource, Source},
 };
 
@@ -39,12 +39,21 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
     let clouds: Vec<_> = datasets.iter().map(|d| Arc::new(d.manifest().clone())).collect();
     let settings = args.settings(camera, &clouds)?;
     let colorings = args.colorings(&clouds);
-    let mut renderer = TruthRenderer::new(&settings, &clouds, SAMPLES)?;
+    let mut hierarchies = Vec::new();
+    for (dataset, text) in datasets.iter().zip(&args.sources) {
+        hierarchies.push(full_resolution(dataset).with_context(|| text.clone())?);
+    }
+    let drawn = |(cloud, nodes): (usize, &Vec<Node>)| {
+        nodes.iter().map(|n| (cloud, n.key, n.spacing)).collect::<Vec<_>>()
+    };
+    let tree = VisibleTree::of(hierarchies.iter().enumerate().flat_map(drawn));
+    let mut renderer = TruthRenderer::new(&settings, &clouds, tree, SAMPLES)?;
     let progress = TerminalProgress::default();
     progress.phase("draw", clouds.iter().map(|cloud| cloud.points).sum(), "points");
     let mut statistics = FrameStatistics::default();
     for (cloud, (dataset, text)) in datasets.iter().zip(&args.sources).enumerate() {
-        draw_cloud(&mut renderer, cloud, dataset, &colorings[cloud], |nodes, points| {
+        let (nodes, groups) = (&hierarchies[cloud], settings.groups(&clouds[cloud]));
+        draw_cloud(&mut renderer, cloud, dataset, nodes, &groups, |nodes, points| {
             statistics.nodes += nodes;
             statistics.points += points;
             progress.advance(points);
@@ -87,23 +96,27 @@ fn open(text: &str) -> anyhow::Result<Dataset<Metered>> {
     Dataset::open(source).with_context(|| text.to_owned())
 }
 
+/// The nodes that hold every point once, in the order in which frames draw, so that equally near
+/// points are resolved alike.
+fn full_resolution(dataset: &Dataset<Metered>) -> anyhow::Result<Vec<Node>> {
+    let mut nodes = dataset.hierarchy()?;
+    if dataset.manifest().refinement == Refinement::Replace {
+        // The leaves are the full resolution; what is above stands in for them.
+        nodes.retain(Node::is_leaf);
+    }
+    nodes.sort_by_key(|node| node.key);
+    Ok(nodes)
+}
+
 fn draw_cloud(
     renderer: &mut TruthRenderer,
     cloud: usize,
     dataset: &Dataset<Metered>,
-    coloring: &Coloring,
+    nodes: &[Node],
+    groups: &[usize],
     mut done: impl FnMut(u64, u64),
 ) -> anyhow::Result<()> {
-    let manifest = dataset.manifest();
-    let mut nodes = dataset.hierarchy()?;
-    if manifest.refinement == Refinement::Replace {
-        // The leaves are the full resolution; what is above stands in for them.
-        nodes.retain(Node::is_leaf);
-    }
-    // The order in which frames draw, so that equally near points are resolved alike.
-    nodes.sort_by_key(|node| node.key);
-    let groups: Vec<usize> = coloring.group(manifest).into_iter().collect();
-    let mut rest = nodes.as_slice();
+    let mut rest = nodes;
     while !rest.is_empty() {
         let mut points = 0;
         let fits = |node: &&Node| {
@@ -114,10 +127,12 @@ fn draw_cloud(
         let count = rest.iter().take_while(fits).count().max(1);
         let (batch, next) = rest.split_at(count);
         rest = next;
-        let read = |node: &Node| dataset.read_node(node, &groups);
-        for points in batch.par_iter().map(read).collect::<Result<Vec<_>, _>>()? {
+        let read = |node: &Node| dataset.read_node(node, groups);
+        let decoded = batch.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        for (node, points) in batch.iter().zip(decoded) {
             done(1, points.positions.len() as u64);
-            renderer.add_node(DrawNode { cloud, key: points.key, points: Arc::new(points) })?;
+            let (key, spacing) = (node.key, node.spacing);
+            renderer.add_node(DrawNode { cloud, key, spacing, points: Arc::new(points) })?;
         }
     }
     Ok(())

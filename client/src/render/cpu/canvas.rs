@@ -18,9 +18,11 @@ use super::footprint::for_each_pixel;
 use crate::{
     engine::DrawNode,
     render::{
+        RenderSettings, Splat, VisibleTree,
         color::NodeColor,
         scene::Surroundings,
-        settings::Splat,
+        size::NodeSize,
+        surface::NodeSurface,
         view::{NodeView, View},
     },
 };
@@ -52,7 +54,8 @@ impl Canvas {
     pub fn draw(
         &mut self,
         view: &View,
-        splat: Splat,
+        settings: &RenderSettings,
+        tree: &VisibleTree,
         clouds: &[Arc<Manifest>],
         around: &Surroundings,
         nodes: &[&DrawNode],
@@ -70,11 +73,18 @@ impl Canvas {
         debug_assert!(next - 1 <= BATCH_POINTS);
         tasks.par_iter().for_each(|&(index, first, end)| {
             let node = nodes[index];
-            let node_view = view.node(&clouds[node.cloud].lattice, node.key, [0; 3]);
+            let cloud = &clouds[node.cloud];
+            let node_view = view.node(&cloud.lattice, node.key, [0; 3]);
+            let surface = NodeSurface::of(settings, cloud, &node.points);
+            let bits = cloud.lattice.node_bits(node.key.level());
+            let place = tree.place(node.cloud, node.key).unwrap_or(u32::MAX);
+            let (size, spacing) = (settings.splat_size, node.spacing);
+            let size = NodeSize::of(size, spacing, tree, place, bits, &surface);
             let positions = &node.points.positions[first..end];
-            self.draw_points(view, splat, &node_view, positions, (starts[index] + first) as u64);
+            let number = (starts[index] + first) as u64;
+            self.draw_points(view, settings.splat, &node_view, &size, positions, first, number);
         });
-        self.take_colors(clouds, around, nodes, &starts);
+        self.take_colors(settings, clouds, around, nodes, &starts);
     }
 
     fn draw_points(
@@ -82,13 +92,15 @@ impl Canvas {
         view: &View,
         splat: Splat,
         node: &NodeView,
+        size: &NodeSize,
         positions: &[[u32; 3]],
+        first: usize,
         first_number: u64,
     ) {
         let [width, height] = self.size;
         let limits = [width as f64, height as f64];
         let one_pixel = splat == Splat::Point && view.smallest_size_px <= 1.0;
-        for (q, number) in positions.iter().zip(first_number..) {
+        for (offset, (q, number)) in positions.iter().zip(first_number..).enumerate() {
             let place = node.origin + node.step * glam::DVec3::from_array(q.map(f64::from));
             let Some(at) = view.project(place) else { continue };
             let key = u64::from((at.distance as f32).abs().to_bits()) << 32 | number;
@@ -97,7 +109,10 @@ impl Canvas {
                     offer(&self.keys[at.y as usize * width + at.x as usize], key);
                 }
             } else {
-                for_each_pixel(splat, &at, self.size, |pixel| offer(&self.keys[pixel], key));
+                let size = view.size(&at, size.world(first + offset, *q));
+                for_each_pixel(splat, &at, size, self.size, |pixel| {
+                    offer(&self.keys[pixel], key);
+                });
             }
         }
     }
@@ -105,6 +120,7 @@ impl Canvas {
     /// Looks up the colours of the batch's points that are seen.
     fn take_colors(
         &mut self,
+        settings: &RenderSettings,
         clouds: &[Arc<Manifest>],
         around: &Surroundings,
         nodes: &[&DrawNode],
@@ -112,7 +128,10 @@ impl Canvas {
     ) {
         let colors: Vec<_> = nodes
             .iter()
-            .map(|n| NodeColor::of(around, n.cloud, &clouds[n.cloud].lattice, &n.points))
+            .map(|n| {
+                let surface = NodeSurface::of(settings, &clouds[n.cloud], &n.points);
+                NodeColor::of(around, n.cloud, &clouds[n.cloud].lattice, &n.points, &surface)
+            })
             .collect();
         self.keys.par_iter_mut().zip(&mut self.colors).with_min_len(4096).for_each(
             |(key, color)| {

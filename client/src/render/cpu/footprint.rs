@@ -9,16 +9,17 @@ use crate::render::{settings::Splat, view::Projected};
 pub(super) fn for_each_pixel(
     splat: Splat,
     at: &Projected,
+    size: f64,
     [width, height]: [usize; 2],
     mut cover: impl FnMut(usize),
 ) {
-    let columns = span(at.x, at.size, width);
-    let radius_squared = 0.25 * at.size * at.size;
-    for row in span(at.y, at.size, height) {
+    let columns = span(at.x, size, width);
+    let radius_squared = 0.25 * size * size;
+    for row in span(at.y, size, height) {
         for column in columns.clone() {
             let inside = match splat {
                 Splat::Point | Splat::Square => true,
-                Splat::Circle => {
+                _ => {
                     let dx = column as f64 + 0.5 - at.x;
                     let dy = row as f64 + 0.5 - at.y;
                     let holds_center = dx.abs() <= 0.5
@@ -52,8 +53,8 @@ mod tests {
 
     fn pixels(splat: Splat, x: f64, y: f64, size: f64) -> Vec<(usize, usize)> {
         let mut covered = Vec::new();
-        let at = Projected { x, y, distance: 1.0, size };
-        for_each_pixel(splat, &at, [8, 6], |i| covered.push((i % 8, i / 8)));
+        let at = Projected { x, y, distance: 1.0, scale: 1.0 };
+        for_each_pixel(splat, &at, size, [8, 6], |i| covered.push((i % 8, i / 8)));
         covered
     }
 

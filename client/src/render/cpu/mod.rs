@@ -23,7 +23,7 @@ impl CpuRenderer {
     /// # Errors
     /// [`RenderError::Settings`] and [`RenderError::Scene`] where the input cannot be drawn.
     pub fn render(&self, scene: &Scene, settings: &RenderSettings) -> Result<Frame, RenderError> {
-        let mut renderer = TruthRenderer::new(settings, scene.clouds, 1)?;
+        let mut renderer = TruthRenderer::new(settings, scene.clouds, scene.tree(), 1)?;
         let nodes = scene.ordered()?;
         let statistics = FrameStatistics::of(&nodes);
         for node in nodes {

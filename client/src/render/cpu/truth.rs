@@ -17,7 +17,7 @@ use super::canvas::{BATCH_POINTS, Canvas};
 use crate::{
     engine::DrawNode,
     render::{
-        Picture, RenderError,
+        Picture, RenderError, VisibleTree,
         scene::{Scene, Surroundings},
         settings::{LARGEST_SIDE_PX, RenderSettings},
         view::View,
@@ -36,6 +36,7 @@ pub struct TruthRenderer {
     samples: u32,
     clouds: Vec<Arc<Manifest>>,
     around: Surroundings,
+    tree: VisibleTree,
     view: View,
     canvas: Canvas,
     gathered: Vec<DrawNode>,
@@ -44,13 +45,15 @@ pub struct TruthRenderer {
 
 impl TruthRenderer {
     /// A renderer for all points of `clouds`, with `samples` by `samples` samples a pixel (1 to
-    /// 16). It holds 12 bytes a sample.
+    /// 16). It holds 12 bytes a sample. `tree` is of all nodes that will be added, for sizes that
+    /// adapt to them.
     ///
     /// # Errors
     /// [`RenderError::Settings`] where the settings cannot be drawn.
     pub fn new(
         settings: &RenderSettings,
         clouds: &[Arc<Manifest>],
+        tree: VisibleTree,
         samples: u32,
     ) -> Result<Self, RenderError> {
         settings.check()?;
@@ -74,6 +77,7 @@ impl TruthRenderer {
             samples,
             clouds: clouds.to_vec(),
             around,
+            tree,
             view,
             canvas: Canvas::new(sides.map(|side| side as usize)),
             gathered: Vec::new(),
@@ -99,8 +103,8 @@ impl TruthRenderer {
 
     fn draw_gathered(&mut self) {
         let nodes: Vec<_> = self.gathered.iter().collect();
-        let splat = self.settings.splat;
-        self.canvas.draw(&self.view, splat, &self.clouds, &self.around, &nodes);
+        let (settings, tree) = (&self.settings, &self.tree);
+        self.canvas.draw(&self.view, settings, tree, &self.clouds, &self.around, &nodes);
         self.gathered.clear();
         self.gathered_points = 0;
     }

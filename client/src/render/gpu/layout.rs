@@ -36,7 +36,7 @@ impl CameraUniform {
             near: view.near as f32,
             depth_bias: view.depth_bias as f32,
             size_px: view.size_px as f32,
-            size_world_px: view.size_world_px as f32,
+            size_world_px: 0.0,
             smallest_size_px: view.smallest_size_px as f32,
             largest_size_px: view.largest_size_px as f32,
             padding: [0.0; 2],

@@ -27,8 +27,8 @@ use self::{
 use crate::{
     engine::DrawNode,
     render::{
-        Frame, FrameStatistics, RenderError, RenderSettings, Scene, Splat, color::NodeColor,
-        ramp::Ramp, scene::Surroundings, view::View,
+        Frame, FrameStatistics, RenderError, RenderSettings, Scene, color::NodeColor, ramp::Ramp,
+        scene::Surroundings, view::View,
     },
 };
 
@@ -111,11 +111,7 @@ impl GpuRenderer {
             self.plan_node(&mut plan, scene, &around, &view, node);
         }
         self.pool.end_frame();
-        let footprint = match settings.splat {
-            Splat::Point => Footprint::Point,
-            Splat::Square => Footprint::Square,
-            Splat::Circle => Footprint::Circle,
-        };
+        let footprint = settings.splat.footprint();
         for run in &plan.runs {
             self.pipelines.make(&self.device.device, (footprint, run.color));
         }
@@ -154,12 +150,12 @@ impl GpuRenderer {
             return;
         }
         let lattice = &scene.clouds[node.cloud].lattice;
-        let colors = NodeColor::of(around, node.cloud, lattice, points);
+        let colors = NodeColor::of(around, node.cloud, lattice, points, &Default::default());
         let source = match colors {
             NodeColor::Rgb { .. } => ColorSource::Rgb,
             NodeColor::Intensity { .. } => ColorSource::Intensity,
             NodeColor::Elevation { .. } => ColorSource::Elevation,
-            NodeColor::Constant(_) => ColorSource::Node,
+            _ => ColorSource::Node,
         };
         let cloud = &scene.clouds[node.cloud];
         let resident = self.pool.node(&self.device, cloud, points, source, &colors);
@@ -181,7 +177,7 @@ impl GpuRenderer {
                 uniform.elevation = (at_corner + per_unit * f64::from(min[2])) as f32;
                 uniform.elevation_step = per_unit as f32;
             }
-            NodeColor::Rgb { .. } | NodeColor::Intensity { .. } => {}
+            _ => {}
         }
         // The plan of a frame is far below 2^32 nodes and chunks: points are counted in memory.
         let index = plan.nodes.len() as u32;
@@ -269,7 +265,7 @@ impl GpuRenderer {
             match footprint {
                 Footprint::Point => pass.draw(0..points, run.chunks.clone()),
                 Footprint::Square => pass.draw_indexed(0..6 * points, 0, run.chunks.clone()),
-                Footprint::Circle => pass.draw(0..3 * points, run.chunks.clone()),
+                _ => pass.draw(0..3 * points, run.chunks.clone()),
             }
         }
     }

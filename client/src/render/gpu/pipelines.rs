@@ -86,7 +86,7 @@ fn make(
         primitive: wgpu::PrimitiveState {
             topology: match footprint {
                 Footprint::Point => wgpu::PrimitiveTopology::PointList,
-                Footprint::Square | Footprint::Circle => wgpu::PrimitiveTopology::TriangleList,
+                _ => wgpu::PrimitiveTopology::TriangleList,
             },
             ..Default::default()
         },
