@@ -7,8 +7,8 @@ use std::{error::Error, fs, path::Path};
 
 use lodestream_fuzz::{BootInput, ColumnsInput, HierarchyInput, leaf, manifest};
 use lodestream_protocol::{
-    Attribute, Boot, Dataset, Domain, HEADER_BYTES, HierarchyPage, Node, NodeKey, PageRef,
-    PayloadRef, Primitive, ReadAt, ScalarType, Storage, decode_unchecked, encode_column,
+    Attribute, Boot, Dataset, Domain, HEADER_BYTES, HierarchyPage, Node, NodeKey, NormalCone,
+    PageRef, PayloadRef, Primitive, ReadAt, ScalarType, Storage, decode_unchecked, encode_column,
     encode_positions, morton_encode,
 };
 
@@ -69,7 +69,7 @@ fn write_paged(path: &Path) -> Result<(), Box<dyn Error>> {
     let node = |key, child_mask| Node {
         child_mask,
         payloads: vec![payload],
-        normal_cone: Some([128, 128, 10]),
+        normal_cone: Some(NormalCone::from_bytes([128, 128, 10])),
         ..leaf(key, 50)
     };
     let children: Vec<NodeKey> = (0..2).filter_map(|octant| NodeKey::ROOT.child(octant)).collect();

@@ -243,7 +243,7 @@ fn to_node(node: &OutNode) -> Node {
         bounds: node.bounds,
         geometric_error: node.geometric_error,
         spacing: node.spacing,
-        normal_cone: None,
+        normal_cone: node.normal_cone,
         payloads: node
             .payloads
             .iter()

@@ -6,6 +6,7 @@
 use lodestream_protocol::{LatticeBox, Manifest, MortonCode, NodeKey};
 
 use crate::{
+    cones::{self, Normals},
     encode::{Layout, NodeEncoder, OutNode, Ranges},
     error::{Error, Result},
     lod::poisson::{self, Domain, Sampled, Skin},
@@ -88,6 +89,8 @@ pub struct Root {
     pub child_mask: u8,
     /// Tight bounds of all points of the chunk.
     pub bounds: LatticeBox,
+    /// Where there are normals: those of all points of the chunk.
+    pub normals: Option<Normals>,
     /// Points in the chunk.
     pub points: u64,
     /// The candidates, in Morton order, relative to the root cube, with their rows.
@@ -137,13 +140,18 @@ fn build_with<C: MortonCode>(
     let sampled = poisson::sample(&tree, &codes, domain, neighbours);
     let bounds = tight_bounds(&tree, &codes, corner);
     let row_bytes = context.layout.row_bytes;
+    let normals = context.layout.normal.map(|column| {
+        let unit = |&point: &u32| column.unit(points.row(point, row_bytes));
+        let units: Vec<[f32; 3]> = order.iter().map(unit).collect();
+        cones::of_tree(&tree, &units)
+    });
 
     let mut encoder = NodeEncoder::new(context.layout);
     let mut nodes = Vec::new();
     for depth in 1..tree.levels.len() {
         for (index, node) in tree.levels[depth].iter().enumerate() {
             let own: Vec<u32> = sampled.points_of(&tree, depth, index).collect();
-            nodes.push(encode_node(
+            let mut out = encode_node(
                 context,
                 &mut encoder,
                 node,
@@ -152,7 +160,9 @@ fn build_with<C: MortonCode>(
                 &codes,
                 &own,
                 |p| points.row(order[p as usize], row_bytes),
-            )?);
+            )?;
+            out.normal_cone = normals.as_ref().map(|normals| normals[depth][index].cone);
+            nodes.push(out);
         }
     }
     let chosen = sampled.root_candidates(&tree);
@@ -171,6 +181,7 @@ fn build_with<C: MortonCode>(
             key,
             child_mask: tree.levels[0][0].child_mask,
             bounds: bounds[0][0],
+            normals: normals.map(|normals| normals[0][0]),
             points: u64::from(count),
             candidates,
         },
@@ -179,7 +190,7 @@ fn build_with<C: MortonCode>(
 }
 
 /// Encodes one node of a tree whose sorted points have `codes` relative to the tree's root.
-/// `own` are the sorted points it keeps.
+/// `own` are the sorted points it keeps. Normal cones are the caller's.
 #[expect(clippy::too_many_arguments, reason = "one call site per tree, all of different kinds")]
 pub fn encode_node<'r, C: MortonCode>(
     context: &Context,
@@ -211,6 +222,7 @@ pub fn encode_node<'r, C: MortonCode>(
         bounds,
         geometric_error: geometric_error as f32,
         spacing: spacing as f32,
+        normal_cone: None,
         payloads,
         part,
         starts,

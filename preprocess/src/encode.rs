@@ -2,10 +2,10 @@
 
 use lodestream_protocol::{
     Attribute, Domain, Error as FormatError, GroupInfo, LatticeBox, Manifest, MortonCode, NodeKey,
-    ScalarType, encode_column, encode_positions,
+    NormalCone, ScalarType, encode_column, encode_positions,
 };
 
-use crate::{readers::InputAttribute, schema::Schema};
+use crate::{cones::NormalColumn, readers::InputAttribute, schema::Schema};
 
 /// Which columns the dataset stores, and where they are in the store's rows.
 #[derive(Debug, Clone)]
@@ -18,6 +18,8 @@ pub struct Layout {
     pub groups: Vec<GroupInfo>,
     /// Bytes of a cut row: what varies.
     pub row_bytes: usize,
+    /// Where the normals are in a cut row, if there are any and they vary.
+    pub normal: Option<NormalColumn>,
     /// What is kept of a row of the store.
     kept: Vec<std::ops::Range<usize>>,
     /// Bytes of a row of the store.
@@ -88,7 +90,11 @@ impl Layout {
                 max: Vec::new(),
             });
         }
-        Self { attributes, offsets, groups, row_bytes, kept, store_row_bytes: schema.row_bytes }
+        let normal =
+            attributes.iter().zip(&offsets).find(|(a, _)| a.is_normal() && a.group().is_some());
+        let normal = normal.map(|(a, &offset)| NormalColumn { offset, scalar: a.scalar });
+        let store_row_bytes = schema.row_bytes;
+        Self { attributes, offsets, groups, row_bytes, normal, kept, store_row_bytes }
     }
 
     /// Rows of the store cut to what varies.
@@ -328,6 +334,8 @@ pub struct OutNode {
     pub geometric_error: f32,
     /// World units.
     pub spacing: f32,
+    /// Where there are normals: holds those of the points in it and below it.
+    pub normal_cone: Option<NormalCone>,
     /// Per group.
     pub payloads: Vec<Payload>,
     /// Which part of the build encoded it, and where its payloads start in that part's buffers.

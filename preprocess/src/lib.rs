@@ -7,6 +7,7 @@ mod assemble;
 mod blobs;
 mod build;
 mod chunk;
+mod cones;
 mod distribute;
 mod encode;
 mod error;

@@ -180,6 +180,12 @@ impl Attribute {
         }
     }
 
+    /// Whether it is the elements' normal.
+    #[must_use]
+    pub fn is_normal(&self) -> bool {
+        self.name == "normal" && self.components == 3 && self.domain == Domain::Element
+    }
+
     /// The constant value as little-endian bytes, where the attribute is constant and well-formed.
     #[must_use]
     pub fn constant(&self) -> Option<Vec<u8>> {

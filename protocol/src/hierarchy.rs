@@ -11,6 +11,7 @@ use crate::{
     key::NodeKey,
     lattice::{Lattice, LatticeBox},
     manifest::Manifest,
+    normal_cone::NormalCone,
     wire::{WirePage, WirePageRef},
 };
 
@@ -57,9 +58,8 @@ pub struct Node {
     /// Distance between neighbouring elements in world units, for splat sizes: the guaranteed
     /// minimum in a sampled node, an estimate of the mean in a leaf.
     pub spacing: f32,
-    /// Axis (octahedral, two bytes) and half angle (units of pi / 255, rounded up) of the cone of
-    /// the normals of this node and all below it, in datasets with normals.
-    pub normal_cone: Option<[u8; 3]>,
+    /// Holds the normals of this node and of all below it, where the dataset stores normals.
+    pub normal_cone: Option<NormalCone>,
     /// One per column group.
     pub payloads: Vec<PayloadRef>,
     /// Set where the children are described in another page.
@@ -180,7 +180,10 @@ impl HierarchyPage {
                 bounds: expand_bounds(wire.bounds[index], key, &manifest.lattice),
                 geometric_error: wire.geometric_errors[index],
                 spacing: wire.spacings[index],
-                normal_cone: wire.normal_cones.get(index).copied(),
+                normal_cone: wire
+                    .normal_cones
+                    .get(index)
+                    .map(|&bytes| NormalCone::from_bytes(bytes)),
                 payloads,
                 child_page,
             };
@@ -216,7 +219,7 @@ impl HierarchyPage {
             wire.bounds.push(quantize_bounds(node.bounds, node.key, lattice));
             wire.geometric_errors.push(node.geometric_error);
             wire.spacings.push(node.spacing);
-            wire.normal_cones.extend(node.normal_cone);
+            wire.normal_cones.extend(node.normal_cone.map(NormalCone::to_bytes));
             for payload in &node.payloads {
                 wire.payload_bytes.push(payload.bytes);
                 wire.payload_crcs.push(payload.crc.to_le_bytes());

@@ -18,6 +18,7 @@ mod key;
 mod lattice;
 mod manifest;
 mod morton;
+mod normal_cone;
 mod wire;
 
 pub use attribute::{Attribute, Domain, ScalarType, Storage};
@@ -34,4 +35,5 @@ pub use key::NodeKey;
 pub use lattice::{Lattice, LatticeBox, MAX_SIDE_BITS};
 pub use manifest::{GroupInfo, Manifest, Method, Primitive, Refinement, SourceInfo};
 pub use morton::{MortonCode, morton_decode, morton_encode};
+pub use normal_cone::NormalCone;
 pub use wire::MAX_PAGE_BYTES;

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use lodestream_protocol::{
     Attribute, Boot, Dataset, Domain, Error, GroupInfo, HierarchyPage, Lattice, LatticeBox,
-    Manifest, Method, Node, NodeKey, PageRef, PayloadRef, Primitive, Refinement, ScalarType,
-    SourceInfo, Storage, encode_column, encode_positions, morton_encode,
+    Manifest, Method, Node, NodeKey, NormalCone, PageRef, PayloadRef, Primitive, Refinement,
+    ScalarType, SourceInfo, Storage, encode_column, encode_positions, morton_encode,
 };
 
 fn attribute(name: &str, scalar: ScalarType, components: u8, group: usize) -> Attribute {
@@ -69,6 +69,9 @@ fn elements(primitive: Primitive) -> Vec<(Attribute, [Vec<u8>; 2])> {
     }
     all
 }
+
+/// Around the third axis and a little wider than half a sphere: all normals above are in it.
+const CONE: NormalCone = NormalCone::from_bytes([128, 127, 128]);
 
 /// A root with two elements and, in a page of its own, one child with one element.
 fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
@@ -135,7 +138,7 @@ fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
         bounds,
         geometric_error: if n == 0 { 0.5 } else { 0.0 },
         spacing: 0.25,
-        normal_cone: (primitive == Primitive::Disc).then_some([128, 127, 30]),
+        normal_cone: (primitive == Primitive::Disc).then_some(CONE),
         payloads: payloads[n]
             .iter()
             .map(|p| PayloadRef { offset: 0, bytes: p.len() as u32, crc: crc32fast::hash(p) })
@@ -204,6 +207,13 @@ fn every_primitive_and_refinement_reads_back() {
             for (index, (_, values)) in elements(primitive).iter().enumerate() {
                 let column = points.column(index).expect("read");
                 assert_eq!(column.bytes, values[n], "{name} attribute {index}");
+                if dataset.manifest().attributes[index].is_normal() {
+                    let cone = node.normal_cone.expect("discs have normals");
+                    for normal in values[n].chunks_exact(12) {
+                        let component = |a: usize| ScalarType::F32.to_f64(&normal[4 * a..]);
+                        assert!(cone.contains(std::array::from_fn(component)));
+                    }
+                }
             }
         }
     }

@@ -47,6 +47,8 @@ class Index:
     root_page: bytes
     end: int  # offset of the first byte after the index
     content_id: str
+    column_bytes: list  # of the nodes read so far: per group, per column
+    cones: dict = field(default_factory=dict)  # of the nodes read so far, by level and cube
 
 
 def read_index(file):
@@ -64,7 +66,9 @@ def read_index(file):
     manifest = file.read(manifest_bytes)
     root_page = file.read(root_page_bytes)
     require(index_crc == zlib.crc32(manifest + root_page), "the index is damaged")
-    return Index(json.loads(manifest), root_page, end, content_id.hex())
+    manifest = json.loads(manifest)
+    sizes = [[0] * (int(group == 0) + len(group_columns(manifest, group))) for group in range(len(manifest["groups"]))]
+    return Index(manifest, root_page, end, content_id.hex(), sizes)
 
 
 # --- hierarchy ---------------------------------------------------------------------------------------------
@@ -266,11 +270,15 @@ def read_node(file, index, node):
     for group, (offset, length, crc) in enumerate(node.payloads):
         require(bool(length) == bool(node.points), "a payload without elements, or elements without a payload")
         payload = Cursor(read_bytes(file, index.end + offset, length, crc, "a payload"))
+        sizes = index.column_bytes[group]
         if group == 0 and length:
             positions = read_positions(*take_column(payload), node.points)
-        for attribute in group_columns(manifest, group):
+            sizes[0] += payload.at
+        for i, attribute in enumerate(group_columns(manifest, group), start=int(group == 0)):
             count = texels if is_texel(attribute) else node.points
+            start = payload.at
             (encoding, data) = take_column(payload) if length else (1, b"")
+            sizes[i] += payload.at - start
             column = read_values(encoding, data, TYPES[attribute["type"]], attribute["components"], count)
             values[attribute["name"]] = column
             if attribute["name"] == "texture_size":
@@ -283,6 +291,7 @@ def read_node(file, index, node):
     require(node.level <= side_bits, "a node is smaller than a lattice unit")
     bits = side_bits - node.level
     check_bounds(node, positions, bits)
+    check_cones(index, node, values)
     corner = np.array(node.cube, np.uint64) << np.uint64(bits)
     for attribute in manifest["attributes"]:
         if "constant" in attribute["storage"]:
@@ -311,6 +320,36 @@ def check_bounds(node, positions, bits):
         highest = -(-(node.bounds[axis + 3] + 1) * 2**bits // 256) - 1
         inside = all(lowest <= int(q) <= highest for q in positions[:, axis])
         require(inside, "a point is outside of its node's bounds")
+
+
+def check_cones(index, node, values):
+    """The normals of a node lie in its own cone and in those of all nodes above."""
+    normal = [a for a in index.manifest["attributes"] if a["name"] == "normal" and a["components"] == 3]
+    stored = any("column" in a["storage"] and not is_texel(a) for a in normal)
+    require(bool(node.normal_cone) == stored, "cones go with normals")
+    if not stored:
+        return
+    index.cones[node.level, node.cube] = node.normal_cone
+    normals = values["normal"].astype(np.float64)
+    lengths = np.sqrt((normals**2).sum(axis=1, keepdims=True))
+    directed = np.isfinite(lengths[:, 0]) & (lengths[:, 0] > 0)
+    units = normals[directed] / lengths[directed]
+    for level in range(node.level + 1):
+        cone = index.cones[level, tuple(c >> (node.level - level) for c in node.cube)]
+        if cone[2] == 255:
+            continue
+        require(directed.all(), "a normal without direction is in a cone of fewer than all directions")
+        angles = np.arccos(np.clip(units @ cone_axis(cone), -1, 1))
+        require((angles <= cone[2] * math.pi / 255).all(), "a normal is outside of a cone")
+
+
+def cone_axis(cone):
+    (u, v) = (cone[0] / 127.5 - 1, cone[1] / 127.5 - 1)
+    z = 1 - abs(u) - abs(v)
+    if z < 0:
+        (u, v) = (math.copysign(1 - abs(v), u), math.copysign(1 - abs(u), v))
+    axis = np.array([u, v, z])
+    return axis / np.sqrt((axis**2).sum())
 
 
 # --- all of it ---------------------------------------------------------------------------------------------
@@ -353,6 +392,8 @@ def read_dataset(path, on_node):
             on_node(coordinates, {name: values[name] for name in element_names})
     for name, found in (("points", points), ("nodes", nodes), ("levels", levels)):
         require(manifest[name] == found, f"the manifest says {manifest[name]} {name}, there are {found}")
+    told = [group["columns"] for group in manifest["groups"]]
+    require(index.column_bytes == told, "columns take other numbers of bytes than the manifest says")
     bounds = world(manifest, np.array([manifest["bounds"]["min"], manifest["bounds"]["max"]], np.uint64)).tolist()
     require(not points or bounds == [low, high], "the manifest's bounds are not those of the points")
     return {

@@ -3,8 +3,8 @@
 
 use lodestream_protocol::{
     Attribute, Boot, Domain, GroupInfo, HierarchyPage, Lattice, LatticeBox, Manifest, Method,
-    MortonCode, Node, NodeKey, PageRef, PayloadRef, Primitive, Refinement, ScalarType, Storage,
-    encode_column, encode_positions,
+    MortonCode, Node, NodeKey, NormalCone, PageRef, PayloadRef, Primitive, Refinement, ScalarType,
+    Storage, encode_column, encode_positions,
 };
 
 /// A dataset and what it shows.
@@ -205,7 +205,7 @@ impl Maker {
             bounds,
             geometric_error: 0.0,
             spacing: 0.25,
-            normal_cone: Some([200, 13, 255]),
+            normal_cone: attributes.iter().any(Attribute::is_normal).then_some(NormalCone::ANY),
             payloads: payloads.iter().map(reference).collect(),
             child_page: None,
         };
