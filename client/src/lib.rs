@@ -3,5 +3,6 @@
 pub mod camera;
 pub mod commands;
 pub mod engine;
+pub mod path;
 pub mod render;
 pub mod source;
