@@ -224,7 +224,7 @@ fn check_beside(
 ) -> Result<(), String> {
     match before {
         None if key.jump => return Err("nothing comes before it: leave out jump".into()),
-        Some(before) if !(key.time - before.time >= SHORTEST_STEP) => {
+        Some(before) if key.time - before.time < SHORTEST_STEP => {
             return Err(format!(
                 "time {} is not after that of the key before, {}, by a microsecond at least",
                 key.time, before.time

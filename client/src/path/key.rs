@@ -102,7 +102,7 @@ impl KeyFrame {
 
     /// What is wrong with the key by itself.
     pub(super) fn check(&self) -> Result<(), String> {
-        if !(self.time.abs() <= LARGEST_TIME) {
+        if !(-LARGEST_TIME..=LARGEST_TIME).contains(&self.time) {
             return Err(format!("time {} is not within ±{LARGEST_TIME:e} seconds", self.time));
         }
         for (name, vector) in
