@@ -3,14 +3,15 @@
 // client/src/render/gpu/pack.rs.
 //
 // A record is x, y, z relative to the lowest corner of the node's points, each with as few bits as
-// the node needs, then the colour payload; records follow one another without padding, lowest bit
+// the node needs, then COLOR_BITS of colour, NORMAL_BITS of normal and SHAPE_BITS of size and axes
+// (constants of the shader's variant); records follow one another without padding, lowest bit
 // first. A chunk is CHUNK_POINTS records and starts at a word.
 
 struct Node {
     // View space position of the anchor, world units.
     anchor_view: vec3<f32>,
-    // Bits of x, y, z and payload, one byte each, lowest first.
-    record_bits: u32,
+    // Bits of x, y, z, one byte each, lowest first.
+    position_bits: u32,
     // View space displacement per lattice step along x, y and z.
     step_x: vec3<f32>,
     // Colour of the whole node: red, green, blue, alpha from the lowest byte.
@@ -23,7 +24,16 @@ struct Node {
     // The lattice point nearest to the eye within the box of the node's points. Differences to
     // it are taken in integers: near the eye nothing is lost, far from it nothing cancels.
     anchor: vec3<u32>,
-    padding: u32,
+    // Diameter of its splats, world units, where all have the same; 0 where sizes are in pixels.
+    size_world: f32,
+    // Lowest corner of its points, lattice units relative to its cube, and bits of the cube's side.
+    corner: vec3<u32>,
+    side_bits: u32,
+    // Its place in the visible tree.
+    tree_place: u32,
+    // World units of 1 in the records' radii and axes.
+    shape_unit: f32,
+    padding: vec2<u32>,
 }
 
 struct Chunk {
@@ -50,25 +60,34 @@ fn read_bits(first_word: u32, bit: u32, count: u32) -> u32 {
     return value & (0xffffffffu >> (32u - count));
 }
 
+// Where a record is.
 struct Record {
-    // Lattice units relative to the lowest corner of the node's points.
-    position: vec3<u32>,
-    payload: u32,
+    first_word: u32,
+    // First bit of the record, and of what follows its position.
+    bit: u32,
+    payload_bit: u32,
+    bits: vec3<u32>,
 }
 
-fn read_record(chunk: Chunk, record_bits: u32, index: u32) -> Record {
-    let bits = vec4(record_bits, record_bits >> 8u, record_bits >> 16u, record_bits >> 24u) & vec4(255u);
-    let x_at = index * (bits.x + bits.y + bits.z + bits.w);
-    let y_at = x_at + bits.x;
-    let z_at = y_at + bits.y;
-    var record: Record;
-    record.position = vec3(
-        read_bits(chunk.first_word, x_at, bits.x),
-        read_bits(chunk.first_word, y_at, bits.y),
-        read_bits(chunk.first_word, z_at, bits.z),
+fn record_at(chunk: Chunk, position_bits: u32, index: u32) -> Record {
+    let bits = vec3(position_bits, position_bits >> 8u, position_bits >> 16u) & vec3(255u);
+    let of_position = bits.x + bits.y + bits.z;
+    let bit = index * (of_position + COLOR_BITS + NORMAL_BITS + SHAPE_BITS);
+    return Record(chunk.first_word, bit, bit + of_position, bits);
+}
+
+// Lattice units relative to the lowest corner of the node's points.
+fn read_position(record: Record) -> vec3<u32> {
+    let y_at = record.bit + record.bits.x;
+    return vec3(
+        read_bits(record.first_word, record.bit, record.bits.x),
+        read_bits(record.first_word, y_at, record.bits.y),
+        read_bits(record.first_word, y_at + record.bits.y, record.bits.z),
     );
-    record.payload = read_bits(chunk.first_word, z_at + bits.z, bits.w);
-    return record;
+}
+
+fn read_color(record: Record) -> u32 {
+    return read_bits(record.first_word, record.payload_bit, COLOR_BITS);
 }
 
 fn view_from_record(node: Node, position: vec3<u32>) -> vec3<f32> {

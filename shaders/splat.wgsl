@@ -1,17 +1,27 @@
-// Splats: one instance is a chunk of records, one splat VERTICES_PER_SPLAT of its vertices.
+// Splats: from a record to a shape on the picture.
 
-@vertex
-fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Varyings {
-    let chunk = chunks[instance];
-    let index = vertex / VERTICES_PER_SPLAT;
-    if index >= chunk.points {
-        return nothing();
-    }
-    let node = nodes[chunk.node];
-    let record = read_record(chunk, node.record_bits, index);
-    let footprint = project(view_from_record(node, record.position));
-    if !footprint.visible {
-        return nothing();
-    }
-    return footprint_vertex(footprint, vertex % VERTICES_PER_SPLAT, splat_color(node, record));
+struct Hit {
+    covered: bool,
+    depth: f32,
+    // Square of the distance from the centre, in radii; at most 1.
+    r_squared: f32,
+}
+
+// A point made ready to be drawn.
+struct Surfel {
+    visible: bool,
+    place: Place,
+    size_px: f32,
+    position: vec3<u32>,
+    record: Record,
+}
+
+fn surfel_at(chunk: Chunk, node: Node, index: u32) -> Surfel {
+    var surfel: Surfel;
+    surfel.record = record_at(chunk, node.position_bits, index);
+    surfel.position = read_position(surfel.record);
+    surfel.place = project(view_from_record(node, surfel.position));
+    surfel.visible = surfel.place.in_front;
+    surfel.size_px = size_px(surfel.place, splat_world_size(node, surfel.record, surfel.position));
+    return surfel;
 }

@@ -6,7 +6,7 @@ use lodestream_protocol::{Attribute, Lattice, Manifest, NodePoints, ScalarType};
 use crate::render::{ramp::Ramp, scene::Surroundings, settings::ColorMode, surface::NodeSurface};
 
 /// Colour of points whose cloud has nothing to colour them by.
-const NEUTRAL: [u8; 3] = [200; 3];
+pub(crate) const NEUTRAL: [u8; 3] = [200; 3];
 
 /// Where the colours of one cloud come from.
 ///

@@ -1,6 +1,6 @@
 //! The renderer that there is: the GPU's, or the CPU's in its place.
 
-use crate::render::{CpuRenderer, Frame, GpuRenderer, RenderError, RenderSettings, Scene};
+use crate::render::{CpuRenderer, Frame, GpuConfig, GpuRenderer, RenderError, RenderSettings, Scene};
 
 /// Draws on the GPU as long as there is one, then on the CPU: the same pictures.
 pub enum Renderer {
@@ -15,7 +15,7 @@ impl Renderer {
     /// CPU renderer, and `told` learns why.
     #[must_use]
     pub fn open(resident_bytes: u64, told: &mut dyn FnMut(&RenderError)) -> Self {
-        match GpuRenderer::new(resident_bytes) {
+        match GpuRenderer::new(GpuConfig { resident_bytes, ..GpuConfig::default() }) {
             Ok(gpu) => Self::Gpu(Box::new(gpu)),
             Err(e) => {
                 told(&e);

@@ -12,7 +12,7 @@ use crate::{
     camera::{Camera, Projection},
     engine::DrawNode,
     render::{
-        ColorMode, CpuRenderer, Frame, GpuRenderer, Picture, RenderSettings, Scene, Splat,
+        ColorMode, CpuRenderer, Frame, GpuConfig, GpuRenderer, Picture, RenderSettings, Scene, Splat,
         SplatSize, TruthRenderer,
         ramp::Ramp,
         ssim,
@@ -36,7 +36,7 @@ fn gpu() -> Option<MutexGuard<'static, GpuRenderer>> {
 }
 
 fn open_gpu(resident_bytes: u64) -> GpuRenderer {
-    GpuRenderer::new(resident_bytes).unwrap_or_else(|e| {
+    GpuRenderer::new(GpuConfig { resident_bytes, ..GpuConfig::default() }).unwrap_or_else(|e| {
         panic!(
             "{e}. The tests need one: apt-get install mesa-vulkan-drivers, or LODESTREAM_NO_GPU=1"
         )
@@ -533,7 +533,7 @@ fn truth(scene: &Scene, settings: &RenderSettings, samples: u32) -> Picture {
     for node in scene.nodes {
         truth.add_node(node.clone()).expect("a node of the scene");
     }
-    truth.finish()
+    truth.finish().expect("one pass").picture
 }
 
 #[test]

@@ -4,13 +4,12 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
-use crate::render::view::{NodeView, View};
+use lodestream_shaders::CHUNK_POINTS;
 
-/// Points of a chunk, which is one instance of a draw call. Large enough that few instances are
-/// drawn, small enough that the unused rest of a node's last chunk (on average half of one) costs
-/// little beside a node's thousands of points; a multiple of 32, so that every chunk of records
-/// starts at a word whatever the bits of a record.
-pub const CHUNK_POINTS: usize = 256;
+use crate::render::{
+    EyeDome,
+    view::{NodeView, View},
+};
 
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -21,14 +20,17 @@ pub struct CameraUniform {
     near: f32,
     depth_bias: f32,
     size_px: f32,
-    size_world_px: f32,
     smallest_size_px: f32,
     largest_size_px: f32,
+    size_factor: f32,
     padding: [f32; 2],
+    rotation: [[f32; 4]; 3],
 }
 
 impl CameraUniform {
-    pub fn new(view: &View) -> Self {
+    /// `size_factor`: times the spacing, for sizes that adapt to it.
+    pub fn new(view: &View, size_factor: f64) -> Self {
+        let rotated = |axis| view.direction(axis).as_vec3().extend(0.0).to_array();
         Self {
             half_size_px: view.half_size_px.as_vec2().to_array(),
             px_per_world: view.px_per_world as f32,
@@ -36,10 +38,11 @@ impl CameraUniform {
             near: view.near as f32,
             depth_bias: view.depth_bias as f32,
             size_px: view.size_px as f32,
-            size_world_px: 0.0,
             smallest_size_px: view.smallest_size_px as f32,
             largest_size_px: view.largest_size_px as f32,
+            size_factor: size_factor as f32,
             padding: [0.0; 2],
+            rotation: [DVec3::X, DVec3::Y, DVec3::Z].map(rotated),
         }
     }
 }
@@ -48,7 +51,7 @@ impl CameraUniform {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct NodeUniform {
     pub anchor_view: [f32; 3],
-    pub record_bits: u32,
+    pub position_bits: u32,
     pub step_x: [f32; 3],
     pub color: u32,
     pub step_y: [f32; 3],
@@ -56,24 +59,26 @@ pub struct NodeUniform {
     pub step_z: [f32; 3],
     pub elevation_step: f32,
     pub anchor: [u32; 3],
-    pub padding: u32,
+    pub size_world: f32,
+    pub corner: [u32; 3],
+    pub side_bits: u32,
+    pub tree_place: u32,
+    pub shape_unit: f32,
+    pub padding: [u32; 2],
 }
 
 impl NodeUniform {
     /// The place of a node whose lattice, relative to the anchor, is `node`.
-    pub fn new(node: &NodeView, anchor: [u32; 3], record_bits: u32) -> Self {
+    pub fn new(node: &NodeView, anchor: [u32; 3], position_bits: u32) -> Self {
         let vector = |v: DVec3| -> [f32; 3] { Vec3::to_array(&v.as_vec3()) };
         Self {
             anchor_view: vector(node.origin),
-            record_bits,
+            position_bits,
             step_x: vector(node.step.x_axis),
-            color: 0,
             step_y: vector(node.step.y_axis),
-            elevation: 0.0,
             step_z: vector(node.step.z_axis),
-            elevation_step: 0.0,
             anchor,
-            padding: 0,
+            ..Self::zeroed()
         }
     }
 }
@@ -86,9 +91,50 @@ pub struct ChunkEntry {
     pub points: u32,
 }
 
-const _: () = assert!(size_of::<CameraUniform>() == 48);
-const _: () = assert!(size_of::<NodeUniform>() == 80);
+/// A run of chunks, for the compute path. WGSL twin: `Run` in `shaders/compute.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct RunUniform {
+    pub first: u32,
+    pub end: u32,
+    pub row: u32,
+    pub pass_index: u32,
+}
+
+/// WGSL twin: `EyeDome` in `shaders/eye_dome.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct EyeDomeUniform {
+    near: f32,
+    px_per_world: f32,
+    perspective: f32,
+    shade: f32,
+    steepest: f32,
+    padding: f32,
+    size_px: [i32; 2],
+    neighbours: [[i32; 2]; 8],
+}
+
+impl EyeDomeUniform {
+    pub fn new(view: &View, size_px: [u32; 2], dome: &EyeDome) -> Self {
+        Self {
+            near: view.near as f32,
+            px_per_world: view.px_per_world as f32,
+            perspective: if view.perspective { 1.0 } else { 0.0 },
+            shade: (-dome.strength / 8.0 / dome.radius_px) as f32,
+            steepest: (EyeDome::STEEPEST * dome.radius_px) as f32,
+            padding: 0.0,
+            // Pictures are far smaller than 2^31 pixels a side.
+            size_px: size_px.map(|side| side as i32),
+            neighbours: dome.neighbours(1),
+        }
+    }
+}
+
+const _: () = assert!(size_of::<CameraUniform>() == 96);
+const _: () = assert!(size_of::<NodeUniform>() == 112);
 const _: () = assert!(size_of::<ChunkEntry>() == 12);
+const _: () = assert!(size_of::<EyeDomeUniform>() == 96);
 const _: () = assert!(CHUNK_POINTS.is_multiple_of(32));
 
 /// Colour as the shaders unpack it: red in the lowest byte.

@@ -2,34 +2,41 @@
 //!
 //! Nodes lie bit-packed in a few large storage buffers ([`pool`]); a frame uploads what is new,
 //! writes one small record per node (where it is in view space) and one per 256 points (where its
-//! records start), and draws whole runs of nodes with one call each. The vertex stage takes the
-//! integers apart, moves them to view space relative to the lattice point nearest to the eye, and
-//! expands splats.
+//! records start) ([`plan`]), and draws whole runs of nodes with one call each ([`passes`]). Shaders
+//! take the integers apart, move them to view space relative to the lattice point nearest to the
+//! eye, and find the pixels that splats cover: by the rasteriser or by compute, whichever is faster
+//! ([`choice`]); both give the same picture.
 
+mod choice;
+mod config;
 mod device;
 mod layout;
 mod pack;
+mod passes;
 mod pipelines;
+mod plan;
 mod pool;
 mod ranges;
 mod target;
 
-use lodestream_shaders::{ColorSource, Footprint};
+use std::time::Instant;
 
+use lodestream_shaders::Pixels;
+
+pub use self::config::{GpuConfig, GpuPath};
 use self::{
+    choice::{Choice, Kind},
     device::Device,
-    layout::{CHUNK_POINTS, CameraUniform, ChunkEntry, NodeUniform, packed_color},
-    pack::RecordLayout,
+    layout::{CameraUniform, packed_color},
+    passes::Passes,
     pipelines::Pipelines,
+    plan::Plan,
     pool::Pool,
-    target::Target,
+    target::{Target, pixel_count},
 };
-use crate::{
-    engine::DrawNode,
-    render::{
-        Frame, FrameStatistics, RenderError, RenderSettings, Scene, color::NodeColor, ramp::Ramp,
-        scene::Surroundings, view::View,
-    },
+use crate::render::{
+    ColorMode, Frame, FrameStatistics, PointsPerPixel, RenderError, RenderSettings, Scene,
+    ramp::Ramp, scene::Surroundings, view::View,
 };
 
 /// Draws with wgpu, into memory.
@@ -38,44 +45,38 @@ pub struct GpuRenderer {
     pipelines: Pipelines,
     pool: Pool,
     ramps: wgpu::Buffer,
-    quad_indices: wgpu::Buffer,
     target: Option<Target>,
+    path: GpuPath,
+    choice: Choice,
 }
 
-/// Consecutive chunks of a frame that one call draws.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Run {
-    color: ColorSource,
-    page: usize,
-    chunks: std::ops::Range<u32>,
-}
-
-/// What a frame draws, in drawing order.
-#[derive(Default)]
-struct Plan {
-    nodes: Vec<NodeUniform>,
-    chunks: Vec<ChunkEntry>,
-    runs: Vec<Run>,
+/// A frame on its way.
+struct Submitted {
+    statistics: FrameStatistics,
+    view: View,
+    /// Whether eye-dome lighting was the last pass.
+    lit: bool,
+    /// What to measure it by, where there is a choice.
+    kind: Option<Kind>,
+    since: Instant,
 }
 
 impl GpuRenderer {
-    /// Opens the best adapter and keeps up to `resident_bytes` of nodes on it between frames.
+    /// Opens the best adapter.
     ///
     /// # Errors
     /// [`RenderError::NoGpu`] where there is no usable adapter: draw on the CPU.
-    pub fn new(resident_bytes: u64) -> Result<Self, RenderError> {
-        let device = Device::open()?;
-        let pipelines = Pipelines::new(&device.device);
-        let pool = Pool::new(&device, pipelines.page_layout.clone(), resident_bytes);
+    pub fn new(config: GpuConfig) -> Result<Self, RenderError> {
+        let device = Device::open(config.least_adapter)?;
+        let pipelines = Pipelines::new(&device.device, device.pixels, device.sums_format);
+        let pool = Pool::new(&device, pipelines.page_layout.clone(), &config);
         let tables = Ramp::IN_SHADERS.iter().flat_map(|ramp| ramp.table());
         let ramps: Vec<u32> = tables.map(packed_color).collect();
         let storage = wgpu::BufferUsages::STORAGE;
-        let ramps = filled(&device, "ramps", storage, bytemuck::cast_slice(&ramps));
-        let indices = pipelines::quad_indices();
-        let index = wgpu::BufferUsages::INDEX;
-        let quad_indices = filled(&device, "quads", index, bytemuck::cast_slice(&indices));
+        let ramps = device.filled("ramps", storage, bytemuck::cast_slice(&ramps));
         device.check()?;
-        Ok(Self { device, pipelines, pool, ramps, quad_indices, target: None })
+        let (target, choice) = (None, Choice::default());
+        Ok(Self { device, pipelines, pool, ramps, target, path: config.path, choice })
     }
 
     /// Adapter, kind and backend, for a user.
@@ -84,7 +85,7 @@ impl GpuRenderer {
         &self.device.name
     }
 
-    /// Draws a scene.
+    /// Draws a scene and takes the picture.
     ///
     /// # Errors
     /// [`RenderError::Settings`] and [`RenderError::Scene`] where the input cannot be drawn;
@@ -94,191 +95,154 @@ impl GpuRenderer {
         scene: &Scene,
         settings: &RenderSettings,
     ) -> Result<Frame, RenderError> {
+        let submitted = self.submit(scene, settings)?;
+        let device = &self.device;
+        let Some(target) = &mut self.target else {
+            return Err(RenderError::Gpu("the picture is gone".into()));
+        };
+        let mut encoder = device.device.create_command_encoder(&Default::default());
+        target.copy(device, &mut encoder, submitted.lit);
+        let counts = (settings.color == ColorMode::Density).then(|| {
+            let bytes = 4 * pixel_count(settings.size_px);
+            let counts = device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("counts"),
+                size: bytes,
+                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            });
+            let pixels = target.pixels(device, Pixels::Narrow);
+            encoder.copy_buffer_to_buffer(&pixels.second, 0, &counts, 0, bytes);
+            counts
+        });
+        device.queue.submit([encoder.finish()]);
+        let (near, bias) = (submitted.view.near as f32, submitted.view.depth_bias as f32);
+        let picture = target.read(device, |depth| near / depth - bias)?;
+        let mut points_per_pixel = None;
+        if let Some(counts) = counts {
+            target::read(device, &counts, |bytes| {
+                let counts: Vec<u32> = bytemuck::pod_collect_to_vec(bytes);
+                points_per_pixel = Some(PointsPerPixel::of(&counts));
+            })?;
+        }
+        self.took(&submitted);
+        Ok(Frame { picture, statistics: submitted.statistics, points_per_pixel })
+    }
+
+    /// Draws a scene, waits until it is drawn, and leaves the picture where it is.
+    ///
+    /// # Errors
+    /// As for [`render`](Self::render).
+    pub fn draw(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+    ) -> Result<FrameStatistics, RenderError> {
+        let submitted = self.submit(scene, settings)?;
+        let wait = wgpu::PollType::wait_indefinitely();
+        self.device.device.poll(wait).map_err(|e| RenderError::Gpu(e.to_string()))?;
+        self.device.check()?;
+        self.took(&submitted);
+        Ok(submitted.statistics)
+    }
+
+    fn took(&mut self, frame: &Submitted) {
+        // A frame that sends nodes to the GPU takes longer for it, however it is drawn.
+        if let Some(kind) = frame.kind
+            && frame.statistics.uploaded_bytes == 0
+        {
+            let by_compute = frame.statistics.path == GpuPath::Compute;
+            self.choice.took(kind, by_compute, frame.since.elapsed());
+        }
+    }
+
+    /// Sends a frame on its way.
+    fn submit(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+    ) -> Result<Submitted, RenderError> {
         settings.check()?;
+        let size_px = settings.size_px;
         let largest = self.device.largest_side_px();
-        if settings.size_px.iter().any(|side| *side > largest) {
+        if size_px.iter().any(|side| *side > largest) {
             return Err(RenderError::Settings(format!(
                 "a picture of {}x{} pixels: {} draws at most {largest} a side",
-                settings.size_px[0], settings.size_px[1], self.device.name
+                size_px[0], size_px[1], self.device.name
             )));
         }
         let nodes = scene.ordered()?;
+        let since = Instant::now();
         let around = Surroundings::of(scene.clouds, settings.color);
         let view = View::new(settings, 1, around.farthest(settings.camera.eye));
+        let tree = scene.tree();
+        let frame = plan::Frame { scene, settings, around: &around, tree: &tree, view: &view };
         self.pool.begin_frame();
         let mut plan = Plan::default();
         for node in &nodes {
-            self.plan_node(&mut plan, scene, &around, &view, node);
+            plan.add(&self.device, &mut self.pool, &frame, node);
         }
         self.pool.end_frame();
-        let footprint = settings.splat.footprint();
-        for run in &plan.runs {
-            self.pipelines.make(&self.device.device, (footprint, run.color));
+
+        let pixels = pixel_count(size_px);
+        let fits = 8 * pixels <= self.device.largest_binding();
+        let counted = settings.color == ColorMode::Density;
+        if counted && !fits {
+            return Err(RenderError::Settings(format!(
+                "{} cannot count the points of {pixels} pixels: ask for a smaller picture",
+                self.device.name
+            )));
         }
-        let device = &self.device.device;
-        let target = self.target.take().filter(|target| target.size_px == settings.size_px);
-        let target = target.unwrap_or_else(|| Target::new(device, settings.size_px));
-        let mut encoder = device.create_command_encoder(&Default::default());
-        self.encode(&mut encoder, &target, &view, footprint, settings.background, &plan);
-        target.copy(&mut encoder);
+        let footprint = settings.splat.footprint();
+        let computable = fits && !settings.splat.is_blended() && !footprint.is_mesh();
+        let kind = (computable && !counted && self.path == GpuPath::Auto)
+            .then(|| Kind::new(footprint, plan.points, pixels));
+        let by_compute = counted
+            || match (kind, self.path) {
+                (Some(kind), _) => self.choice.by_compute(kind),
+                (None, path) => computable && path == GpuPath::Compute,
+            };
+
+        let target = self.target.take().filter(|target| target.size_px == size_px);
+        let mut target = target.unwrap_or_else(|| Target::new(&self.device.device, size_px));
+        let mut encoder = self.device.device.create_command_encoder(&Default::default());
+        let camera = CameraUniform::new(&view, frame.size_factor());
+        let mut passes = Passes::new(
+            &self.device,
+            &mut self.pipelines,
+            &self.pool,
+            &plan,
+            &mut target,
+            &mut encoder,
+            &self.ramps,
+            &camera,
+            &tree,
+            settings.background,
+        );
+        if counted {
+            passes.density();
+        } else if settings.splat.is_blended() {
+            passes.blended();
+        } else if by_compute {
+            passes.compute();
+        } else {
+            passes.raster();
+        }
+        let dome = settings.shading.eye_dome.filter(|_| !counted);
+        if let Some(dome) = &dome {
+            passes.eye_dome(&view, dome);
+        }
         self.device.queue.submit([encoder.finish()]);
-        let (near, bias) = (view.near as f32, view.depth_bias as f32);
-        let picture = target.read(&self.device, |depth| near / depth - bias)?;
         self.target = Some(target);
         let (resident_bytes, uploaded_bytes) = self.pool.bytes();
-        let draw_calls = plan.runs.len() as u64;
         let statistics = FrameStatistics {
-            draw_calls,
+            nodes: plan.nodes.len() as u64,
+            points: plan.points,
+            draw_calls: plan.runs.len() as u64,
             uploaded_bytes,
             resident_bytes,
-            ..FrameStatistics::of(&nodes)
+            waiting_nodes: plan.waiting_nodes,
+            path: if by_compute { GpuPath::Compute } else { GpuPath::Raster },
         };
-        Ok(Frame { picture, statistics })
+        Ok(Submitted { statistics, view, lit: dome.is_some(), kind, since })
     }
-
-    /// Uploads a node where needed and appends it to the plan.
-    fn plan_node(
-        &mut self,
-        plan: &mut Plan,
-        scene: &Scene,
-        around: &Surroundings,
-        view: &View,
-        node: &DrawNode,
-    ) {
-        let points = node.points.as_ref();
-        if points.positions.is_empty() {
-            return;
-        }
-        let lattice = &scene.clouds[node.cloud].lattice;
-        let colors = NodeColor::of(around, node.cloud, lattice, points, &Default::default());
-        let source = match colors {
-            NodeColor::Rgb { .. } => ColorSource::Rgb,
-            NodeColor::Intensity { .. } => ColorSource::Intensity,
-            NodeColor::Elevation { .. } => ColorSource::Elevation,
-            _ => ColorSource::Node,
-        };
-        let cloud = &scene.clouds[node.cloud];
-        let resident = self.pool.node(&self.device, cloud, points, source, &colors);
-
-        let RecordLayout { min, max, .. } = resident.layout;
-        // The lattice point of the node's box nearest to the eye.
-        let eye = view.eye_in_node(lattice, points.key);
-        let nearest = |axis: usize| {
-            let eye = eye[axis].round().clamp(f64::from(min[axis]), f64::from(max[axis]));
-            eye as u32
-        };
-        let anchor: [u32; 3] = std::array::from_fn(nearest);
-        let node_view = view.node(lattice, points.key, anchor);
-        let relative = std::array::from_fn(|axis| anchor[axis] - min[axis]);
-        let mut uniform = NodeUniform::new(&node_view, relative, resident.layout.record_bits());
-        match colors {
-            NodeColor::Constant(color) => uniform.color = packed_color(color),
-            NodeColor::Elevation { at_corner, per_unit } => {
-                uniform.elevation = (at_corner + per_unit * f64::from(min[2])) as f32;
-                uniform.elevation_step = per_unit as f32;
-            }
-            _ => {}
-        }
-        // The plan of a frame is far below 2^32 nodes and chunks: points are counted in memory.
-        let index = plan.nodes.len() as u32;
-        plan.nodes.push(uniform);
-        let chunk_words = resident.layout.chunk_words() as u32;
-        for piece in &resident.pieces {
-            let first = plan.chunks.len() as u32;
-            let starts = (0..piece.points).step_by(CHUNK_POINTS);
-            plan.chunks.extend(starts.zip(0..).map(|(start, chunk)| ChunkEntry {
-                node: index,
-                first_word: piece.first_word + chunk * chunk_words,
-                points: (piece.points - start).min(CHUNK_POINTS as u32),
-            }));
-            let end = plan.chunks.len() as u32;
-            match plan.runs.last_mut() {
-                Some(run) if run.color == source && run.page == piece.page => run.chunks.end = end,
-                _ => plan.runs.push(Run { color: source, page: piece.page, chunks: first..end }),
-            }
-        }
-    }
-
-    /// Records the pass that draws a plan.
-    fn encode(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
-        view: &View,
-        footprint: Footprint,
-        background: [u8; 3],
-        plan: &Plan,
-    ) {
-        let [r, g, b] = background.map(|component| f64::from(component) / 255.0);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("splats"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &target.color_view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &target.depth_view,
-                depth_ops: Some(wgpu::Operations {
-                    // Reversed depth: infinitely far away.
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        });
-        if plan.runs.is_empty() {
-            return;
-        }
-        let storage = wgpu::BufferUsages::STORAGE;
-        let camera = CameraUniform::new(view);
-        let uniform = wgpu::BufferUsages::UNIFORM;
-        let camera = filled(&self.device, "camera", uniform, bytemuck::bytes_of(&camera));
-        let nodes = filled(&self.device, "nodes", storage, bytemuck::cast_slice(&plan.nodes));
-        let chunks = filled(&self.device, "chunks", storage, bytemuck::cast_slice(&plan.chunks));
-        let buffers = [&camera, &nodes, &chunks, &self.ramps];
-        let entries: Vec<_> = buffers
-            .iter()
-            .zip(0..)
-            .map(|(b, binding)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
-            .collect();
-        let frame = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("frame"),
-            layout: &self.pipelines.frame_layout,
-            entries: &entries,
-        });
-        pass.set_bind_group(0, &frame, &[]);
-        pass.set_index_buffer(self.quad_indices.slice(..), wgpu::IndexFormat::Uint16);
-        for run in &plan.runs {
-            let pipeline = self.pipelines.get((footprint, run.color));
-            let (Some(pipeline), Some(page)) = (pipeline, self.pool.bind_group(run.page)) else {
-                continue;
-            };
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(1, page, &[]);
-            let points = CHUNK_POINTS as u32;
-            match footprint {
-                Footprint::Point => pass.draw(0..points, run.chunks.clone()),
-                Footprint::Square => pass.draw_indexed(0..6 * points, 0, run.chunks.clone()),
-                _ => pass.draw(0..3 * points, run.chunks.clone()),
-            }
-        }
-    }
-}
-
-/// A buffer that holds `bytes` (not empty, a multiple of four).
-fn filled(device: &Device, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
-    let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: bytes.len() as u64,
-        usage: usage | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    device.queue.write_buffer(&buffer, 0, bytes);
-    buffer
 }

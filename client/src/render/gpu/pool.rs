@@ -9,16 +9,16 @@
 use std::sync::Arc;
 
 use lodestream_protocol::{Manifest, NodeKey, NodePoints};
-use lodestream_shaders::ColorSource;
+use lodestream_shaders::CHUNK_POINTS;
 use lru::LruCache;
 
 use super::{
+    config::GpuConfig,
     device::Device,
-    layout::CHUNK_POINTS,
-    pack::{RecordLayout, pack},
+    pack::{RecordFields, RecordLayout, pack},
     ranges::FreeRanges,
 };
-use crate::render::color::NodeColor;
+use crate::render::{color::NodeColor, surface::NodeSurface};
 
 /// A page.
 struct Page {
@@ -54,7 +54,7 @@ struct Key {
     /// Address of the manifest: what a cloud is known by as long as anything of it is here.
     cloud: usize,
     node: NodeKey,
-    payload_bits: u8,
+    fields: RecordFields,
 }
 
 /// Nodes on the GPU.
@@ -64,17 +64,18 @@ pub struct Pool {
     bind_group_layout: wgpu::BindGroupLayout,
     page_words: u32,
     budget_bytes: u64,
+    upload_bytes_per_frame: u64,
     frame: u64,
     resident_bytes: u64,
     uploaded_bytes: u64,
 }
 
 impl Pool {
-    /// A pool whose pages take at most `budget_bytes`, or one page where that is more.
+    /// A pool whose pages take at most `resident_bytes`, or one page where that is more.
     pub fn new(
         device: &Device,
         bind_group_layout: wgpu::BindGroupLayout,
-        budget_bytes: u64,
+        config: &GpuConfig,
     ) -> Self {
         // Word numbers fit u32: a page is 32 MiB at most.
         let page_words = u32::try_from(device.page_bytes / 4).unwrap_or(u32::MAX);
@@ -83,7 +84,8 @@ impl Pool {
             nodes: LruCache::unbounded(),
             bind_group_layout,
             page_words,
-            budget_bytes,
+            budget_bytes: config.resident_bytes,
+            upload_bytes_per_frame: config.upload_bytes_per_frame,
             frame: 0,
             resident_bytes: 0,
             uploaded_bytes: 0,
@@ -118,41 +120,52 @@ impl Pool {
         self.pages.get(page)?.as_ref().map(|page| &page.bind_group)
     }
 
-    /// A node of `cloud` with the payload of `source`, uploaded if it is not there yet.
+    /// A node of `cloud` with records of `fields`, uploaded if it is not there yet; `None` where
+    /// that must wait for another frame.
     pub fn node(
         &mut self,
         device: &Device,
         cloud: &Arc<Manifest>,
         points: &NodePoints,
-        source: ColorSource,
+        fields: RecordFields,
         colors: &NodeColor,
-    ) -> &Resident {
-        let payload_bits = source.payload_bits();
-        let key = Key { cloud: Arc::as_ptr(cloud).addr(), node: points.key, payload_bits };
+        surface: &NodeSurface,
+    ) -> Option<&Resident> {
+        let key = Key { cloud: Arc::as_ptr(cloud).addr(), node: points.key, fields };
         if !self.nodes.contains(&key) {
-            let layout = RecordLayout::of(points, source);
-            let pieces = self.upload(device, points, &layout, colors);
+            if self.uploaded_bytes >= self.upload_bytes_per_frame {
+                return None;
+            }
+            let layout = RecordLayout::of(points, fields, surface);
+            let words = pack(points, &layout, colors, surface);
+            let bytes = words.len() as u64 * 4;
+            // One node at least, however large.
+            if self.uploaded_bytes > 0
+                && self.uploaded_bytes.saturating_add(bytes) > self.upload_bytes_per_frame
+            {
+                return None;
+            }
+            let pieces = self.upload(device, points.positions.len(), &layout, &words);
             let resident = Resident { layout, pieces, frame: 0, _cloud: Arc::clone(cloud) };
             self.nodes.put(key, resident);
         }
         let frame = self.frame;
         let resident = self.nodes.get_mut(&key).expect("just put there where it was missing");
         resident.frame = frame;
-        resident
+        Some(resident)
     }
 
     fn upload(
         &mut self,
         device: &Device,
-        points: &NodePoints,
+        points: usize,
         layout: &RecordLayout,
-        colors: &NodeColor,
+        words: &[u32],
     ) -> Vec<Piece> {
-        let words = pack(points, layout, colors);
         let chunk_words = layout.chunk_words();
         // A quarter of a page at most, so that pieces fill pages well.
         let piece_chunks = (self.page_words as usize / 4 / chunk_words).max(1);
-        let mut left = points.positions.len();
+        let mut left = points;
         let mut pieces = Vec::new();
         for piece in words.chunks(piece_chunks * chunk_words) {
             let points = left.min(piece_chunks * CHUNK_POINTS);

@@ -1,0 +1,170 @@
+//! What a frame draws, in drawing order: one record per node, one per chunk, and runs of chunks that
+//! are drawn with one call each.
+
+use lodestream_shaders::{CHUNK_POINTS, ColorSource, ShapeField, SizeSource, Splatting};
+
+use super::{
+    device::Device,
+    layout::{ChunkEntry, NodeUniform, packed_color},
+    pack::{RecordFields, RecordLayout},
+    pool::Pool,
+};
+use crate::{
+    engine::DrawNode,
+    render::{
+        ColorMode, RenderSettings, Scene, Splat, SplatSize, VisibleTree,
+        color::NodeColor,
+        scene::Surroundings,
+        settings::CLOSED_SURFACE,
+        surface::{NodeSurface, SurfaceParts},
+        view::View,
+    },
+};
+
+/// Consecutive chunks of a frame that one call draws.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Run {
+    pub splatting: Splatting,
+    pub page: usize,
+    pub chunks: std::ops::Range<u32>,
+}
+
+/// What a frame draws.
+#[derive(Default)]
+pub struct Plan {
+    pub nodes: Vec<NodeUniform>,
+    pub chunks: Vec<ChunkEntry>,
+    pub runs: Vec<Run>,
+    /// Nodes that wait for a later frame.
+    pub waiting_nodes: u64,
+    /// Points in the nodes that are drawn.
+    pub points: u64,
+}
+
+/// What all nodes of a frame share.
+pub struct Frame<'a> {
+    pub scene: &'a Scene<'a>,
+    pub settings: &'a RenderSettings,
+    pub around: &'a Surroundings,
+    pub tree: &'a VisibleTree,
+    pub view: &'a View,
+}
+
+impl Frame<'_> {
+    /// Times the spacing, for sizes that adapt to it.
+    pub const fn size_factor(&self) -> f64 {
+        match self.settings.splat_size {
+            SplatSize::Adaptive(factor) => factor,
+            _ => CLOSED_SURFACE,
+        }
+    }
+
+    /// How the nodes of a cloud are drawn whose colours are `colors`.
+    fn splatting(&self, cloud: usize, colors: &NodeColor) -> Splatting {
+        let color = match colors {
+            NodeColor::Rgb { .. } => ColorSource::Rgb,
+            NodeColor::Intensity { .. } => ColorSource::Intensity,
+            NodeColor::Class { .. } => ColorSource::Class,
+            NodeColor::Normal(_) => ColorSource::Normal,
+            NodeColor::Elevation { .. } => ColorSource::Elevation,
+            NodeColor::Constant(_) => ColorSource::Node,
+        };
+        let parts = SurfaceParts::of(self.settings, &self.scene.clouds[cloud]);
+        let shape = match parts {
+            SurfaceParts { axes: true, .. } => ShapeField::Axes,
+            SurfaceParts { radii: true, .. } => ShapeField::Radius,
+            _ => ShapeField::None,
+        };
+        let counted = self.settings.color == ColorMode::Density;
+        let footprint = if counted { Splat::Point } else { self.settings.splat }.footprint();
+        let size = match (self.settings.splat_size, shape) {
+            // A point has no size to look up.
+            _ if footprint == Splat::Point.footprint() => SizeSource::Node,
+            (SplatSize::Own, ShapeField::None) | (SplatSize::Adaptive(_), _) => {
+                SizeSource::Adaptive
+            }
+            (SplatSize::Own, _) => SizeSource::Record,
+            _ => SizeSource::Node,
+        };
+        let phong = self.settings.shading.phong && !counted;
+        Splatting { footprint, color, size, normals: parts.normals, shape, phong }
+    }
+}
+
+impl Plan {
+    /// Uploads a node where needed and appends it.
+    pub fn add(&mut self, device: &Device, pool: &mut Pool, frame: &Frame, node: &DrawNode) {
+        let points = node.points.as_ref();
+        if points.positions.is_empty() {
+            return;
+        }
+        let Frame { scene, settings, around, tree, view } = frame;
+        let cloud = &scene.clouds[node.cloud];
+        let lattice = &cloud.lattice;
+        let surface = NodeSurface::of(settings, cloud, points);
+        let colors = NodeColor::of(around, node.cloud, lattice, points, &surface);
+        let splatting = frame.splatting(node.cloud, &colors);
+        let Splatting { color, normals, shape, .. } = splatting;
+        // What takes no payload shares its records.
+        let payload = if color.payload_bits() == 0 { ColorSource::Node } else { color };
+        let fields = RecordFields { color: payload, normals, shape };
+        let Some(resident) = pool.node(device, cloud, points, fields, &colors, &surface) else {
+            self.waiting_nodes += 1;
+            return;
+        };
+        self.points += points.positions.len() as u64;
+
+        let RecordLayout { min, max, shape_unit, .. } = resident.layout;
+        // The lattice point of the node's box nearest to the eye.
+        let eye = view.eye_in_node(lattice, points.key);
+        let nearest = |axis: usize| {
+            let eye = eye[axis].round().clamp(f64::from(min[axis]), f64::from(max[axis]));
+            eye as u32
+        };
+        let anchor: [u32; 3] = std::array::from_fn(nearest);
+        let node_view = view.node(lattice, points.key, anchor);
+        let relative = std::array::from_fn(|axis| anchor[axis] - min[axis]);
+        let place = NodeUniform::new(&node_view, relative, resident.layout.position_bits());
+        let mut uniform = NodeUniform {
+            size_world: match settings.splat_size {
+                SplatSize::World(size) => size as f32,
+                SplatSize::Level(factor) => (factor * f64::from(node.spacing)) as f32,
+                SplatSize::Pixels(_) | SplatSize::Adaptive(_) | SplatSize::Own => 0.0,
+            },
+            corner: min,
+            side_bits: u32::from(lattice.node_bits(points.key.level())),
+            tree_place: tree.place(node.cloud, points.key).unwrap_or(0),
+            shape_unit,
+            color: packed_color(crate::render::color::NEUTRAL),
+            ..place
+        };
+        match colors {
+            NodeColor::Constant(color) => uniform.color = packed_color(color),
+            NodeColor::Elevation { at_corner, per_unit } => {
+                uniform.elevation = (at_corner + per_unit * f64::from(min[2])) as f32;
+                uniform.elevation_step = per_unit as f32;
+            }
+            _ => {}
+        }
+        // The plan of a frame is far below 2^32 nodes and chunks: points are counted in memory.
+        let index = self.nodes.len() as u32;
+        self.nodes.push(uniform);
+        let chunk_words = resident.layout.chunk_words() as u32;
+        for piece in &resident.pieces {
+            let first = self.chunks.len() as u32;
+            let starts = (0..piece.points).step_by(CHUNK_POINTS);
+            self.chunks.extend(starts.zip(0..).map(|(start, chunk)| ChunkEntry {
+                node: index,
+                first_word: piece.first_word + chunk * chunk_words,
+                points: (piece.points - start).min(CHUNK_POINTS as u32),
+            }));
+            let end = self.chunks.len() as u32;
+            match self.runs.last_mut() {
+                Some(run) if run.splatting == splatting && run.page == piece.page => {
+                    run.chunks.end = end;
+                }
+                _ => self.runs.push(Run { splatting, page: piece.page, chunks: first..end }),
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+// Compute path: a workgroup is a chunk of records; each invocation offers one splat to the pixels
+// that it covers. The nearest wins; of equally near ones, the first drawn.
+//
+// Fixed-function rasterisers set up triangles one after the other, which for splats of a few pixels
+// is all the cost. (As in Schütz et al. 2021, Rendering Point Clouds with Compute Shaders)
+
+// Consecutive chunks that lie in the bound page.
+struct Run {
+    first: u32,
+    end: u32,
+    // Workgroups in a row of the dispatch, which is two-dimensional: one dimension has at most 65535.
+    row: u32,
+    // Where two passes are needed: which it is.
+    pass_index: u32,
+}
+
+@group(2) @binding(0) var<uniform> run: Run;
+
+@compute @workgroup_size(CHUNK_POINTS)
+fn rasterise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) index: u32) {
+    let chunk_index = run.first + group.y * run.row + group.x;
+    if chunk_index >= run.end {
+        return;
+    }
+    let chunk = chunks[chunk_index];
+    if index >= chunk.points {
+        return;
+    }
+    let node = nodes[chunk.node];
+    let surfel = surfel_at(chunk, node, index);
+    if !surfel.visible {
+        return;
+    }
+    let shape = shape_of_surfel(node, surfel);
+    let size = 2.0 * camera.half_size_px;
+    let box = box_of(shape);
+    // The pixels whose middles lie in the box; written so that a box that is none has no pixels.
+    let low = max(floor(box.xy), vec2(0.0));
+    let high = min(ceil(box.zw), size);
+    if !all(low < high) {
+        return;
+    }
+    let width = u32(size.x);
+    let first = vec2<u32>(low);
+    let end = vec2<u32>(high);
+    // Owners count down, so that of equal depths the first drawn is the greatest.
+    let owner = 0xffffffffu - (chunk_index * CHUNK_POINTS + index);
+    for (var y = first.y; y < end.y; y++) {
+        for (var x = first.x; x < end.x; x++) {
+            let hit = hit(shape, vec2(f32(x), f32(y)) + 0.5);
+            if hit.covered {
+                offer(y * width + x, hit.depth, owner);
+            }
+        }
+    }
+}
