@@ -9,6 +9,7 @@
 
 mod color;
 mod cpu;
+mod density;
 mod gpu;
 mod picture;
 mod ramp;
@@ -32,7 +33,8 @@ use serde::Serialize;
 
 pub use color::Coloring;
 pub use cpu::{CpuRenderer, TruthRenderer};
-pub use gpu::GpuRenderer;
+pub use density::PointsPerPixel;
+pub use gpu::{GpuConfig, GpuPath, GpuRenderer};
 pub use picture::Picture;
 pub use renderer::Renderer;
 pub use scene::Scene;
@@ -94,6 +96,10 @@ pub struct FrameStatistics {
     pub uploaded_bytes: u64,
     /// Bytes of nodes on the GPU after this frame.
     pub resident_bytes: u64,
+    /// Nodes that are not drawn yet: sending them to the GPU is left to later frames.
+    pub waiting_nodes: u64,
+    /// How splats got to pixels (GPU only).
+    pub path: GpuPath,
 }
 
 impl FrameStatistics {
@@ -110,4 +116,6 @@ pub struct Frame {
     pub picture: Picture,
     /// What it took.
     pub statistics: FrameStatistics,
+    /// What was counted, where the colours are by [`ColorMode::Density`].
+    pub points_per_pixel: Option<PointsPerPixel>,
 }

@@ -60,7 +60,7 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
         })
         .with_context(|| text.clone())?;
     }
-    let picture = renderer.finish();
+    let picture = renderer.finish()?.picture;
     progress.finish();
     let milliseconds = start.elapsed().as_secs_f64() * 1e3;
     let sum = |count: fn(&Metered) -> &AtomicU64| {

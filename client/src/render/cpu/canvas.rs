@@ -1,164 +1,217 @@
-//! What the CPU draws on: one 64-bit key per pixel, taken by the smallest.
+//! What the CPU draws on: one 64-bit key per sample, taken by the smallest.
 //!
 //! A key is the distance (its f32 bits order like the number, as it is not negative) above the
 //! number of the point in the batch being drawn. Threads offer keys with an atomic minimum, so that
-//! the outcome does not hang on their order: the nearest point is seen and, of points equally near,
-//! the first. Colours are looked up only for points that are seen, when the batch is done; then
-//! the number of the pixel's point becomes 0, which is before all points of the next batch.
+//! the outcome does not hang on their order: the nearest part is seen and, of parts equally near,
+//! that of the first point. Colours are looked up only for points that are seen, when the batch is
+//! done; then the number of the sample's point becomes 0, which is before all points of the next
+//! batch.
+//!
+//! Blended splats and counts keep distances only, and sums beside them.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicU64, Ordering},
-};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use lodestream_protocol::Manifest;
 use rayon::prelude::*;
 
-use super::footprint::for_each_pixel;
-use crate::{
-    engine::DrawNode,
-    render::{
-        RenderSettings, Splat, VisibleTree,
-        color::NodeColor,
-        scene::Surroundings,
-        size::NodeSize,
-        surface::NodeSurface,
-        view::{NodeView, View},
-    },
+use super::{
+    batch::{Batch, Task},
+    blend::Sums,
+    footprint::{Fragment, Grid},
+    stage::Stage,
 };
+use crate::render::{ColorMode, PointsPerPixel, density};
 
-/// A pixel on which nothing was drawn: behind everything.
+/// A sample on which nothing was drawn: behind everything.
 const EMPTY: u64 = u64::MAX;
 
-/// Points that one task draws: enough to make its set-up cheap, few enough to share the work out.
-const TASK_POINTS: usize = 8192;
+/// Samples that one task looks through.
+const TASK_SAMPLES: usize = 4096;
 
-/// Most points in a batch: their numbers, from 1, fit the lower half of a key.
-pub(super) const BATCH_POINTS: usize = u32::MAX as usize - 1;
+/// What colours come from.
+enum Ink {
+    /// The nearest point.
+    Nearest,
+    /// Means of the foremost surface; empty while that is being found.
+    Blended(Vec<Sums>),
+    /// How many points there are.
+    Counted(Vec<AtomicU32>),
+}
 
 pub(super) struct Canvas {
-    size: [usize; 2],
+    grid: Grid,
     keys: Vec<AtomicU64>,
+    ink: Ink,
+    /// Of the samples; complete once the canvas is [dry](Self::dry).
     colors: Vec<[u8; 3]>,
 }
 
 impl Canvas {
-    pub fn new(size: [usize; 2]) -> Self {
-        let pixels = size[0] * size[1];
-        let mut keys = Vec::new();
-        keys.resize_with(pixels, || AtomicU64::new(EMPTY));
-        Self { size, keys, colors: vec![[0; 3]; pixels] }
+    /// An empty canvas for pictures of a stage.
+    pub fn new(stage: &Stage) -> Self {
+        let grid = stage.grid();
+        let samples = grid.width * grid.height;
+        let ink = if stage.settings.color == ColorMode::Density {
+            Ink::Counted(filled(samples, || AtomicU32::new(0)))
+        } else if stage.settings.splat.is_blended() {
+            Ink::Blended(Vec::new())
+        } else {
+            Ink::Nearest
+        };
+        let keys = filled(samples, || AtomicU64::new(EMPTY));
+        Self { grid, keys, ink, colors: vec![[0; 3]; samples] }
     }
 
-    /// Draws nodes of `clouds` with at most [`BATCH_POINTS`] points in all.
-    pub fn draw(
-        &mut self,
-        view: &View,
-        settings: &RenderSettings,
-        tree: &VisibleTree,
-        clouds: &[Arc<Manifest>],
-        around: &Surroundings,
-        nodes: &[&DrawNode],
-    ) {
-        let mut starts = Vec::with_capacity(nodes.len());
-        let mut tasks = Vec::new();
-        let mut next = 1;
-        for (index, node) in nodes.iter().enumerate() {
-            let count = node.points.positions.len();
-            starts.push(next);
-            let firsts = (0..count).step_by(TASK_POINTS);
-            tasks.extend(firsts.map(|first| (index, first, (first + TASK_POINTS).min(count))));
-            next += count;
+    /// How many times everything is drawn, [`turn`](Self::turn)ed in between.
+    pub const fn passes(&self) -> u32 {
+        match self.ink {
+            Ink::Nearest | Ink::Counted(_) => 1,
+            Ink::Blended(_) => 2,
         }
-        debug_assert!(next - 1 <= BATCH_POINTS);
-        tasks.par_iter().for_each(|&(index, first, end)| {
-            let node = nodes[index];
-            let cloud = &clouds[node.cloud];
-            let node_view = view.node(&cloud.lattice, node.key, [0; 3]);
-            let surface = NodeSurface::of(settings, cloud, &node.points);
-            let bits = cloud.lattice.node_bits(node.key.level());
-            let place = tree.place(node.cloud, node.key).unwrap_or(u32::MAX);
-            let (size, spacing) = (settings.splat_size, node.spacing);
-            let size = NodeSize::of(size, spacing, tree, place, bits, &surface);
-            let positions = &node.points.positions[first..end];
-            let number = (starts[index] + first) as u64;
-            self.draw_points(view, settings.splat, &node_view, &size, positions, first, number);
-        });
-        self.take_colors(settings, clouds, around, nodes, &starts);
     }
 
-    fn draw_points(
-        &self,
-        view: &View,
-        splat: Splat,
-        node: &NodeView,
-        size: &NodeSize,
-        positions: &[[u32; 3]],
-        first: usize,
-        first_number: u64,
-    ) {
-        let [width, height] = self.size;
-        let limits = [width as f64, height as f64];
-        let one_pixel = splat == Splat::Point && view.smallest_size_px <= 1.0;
-        for (offset, (q, number)) in positions.iter().zip(first_number..).enumerate() {
-            let place = node.origin + node.step * glam::DVec3::from_array(q.map(f64::from));
-            let Some(at) = view.project(place) else { continue };
-            let key = u64::from((at.distance as f32).abs().to_bits()) << 32 | number;
-            if one_pixel {
-                if at.x >= 0.0 && at.y >= 0.0 && at.x < limits[0] && at.y < limits[1] {
-                    offer(&self.keys[at.y as usize * width + at.x as usize], key);
-                }
-            } else {
-                let size = view.size(&at, size.world(first + offset, *q));
-                for_each_pixel(splat, &at, size, self.size, |pixel| {
-                    offer(&self.keys[pixel], key);
+    /// From finding the foremost surface to averaging it.
+    pub fn turn(&mut self) {
+        if let Ink::Blended(sums) = &mut self.ink {
+            *sums = filled(self.keys.len(), Sums::default);
+        }
+    }
+
+    /// Draws the points of a batch.
+    pub fn draw(&mut self, stage: &Stage, batch: &Batch) {
+        let (grid, keys) = (self.grid, &self.keys);
+        match &self.ink {
+            Ink::Nearest => {
+                batch.for_each(|Task { node, run, start, .. }| {
+                    stage.draw(node, run, grid, |index, part: Fragment| {
+                        offer(&keys[part.pixel], key(part.distance, start + index));
+                    });
+                });
+                self.take_colors(stage, batch);
+            }
+            Ink::Blended(sums) if sums.is_empty() => {
+                batch.for_each(|Task { node, run, .. }| {
+                    stage.draw(node, run, grid, |_, part: Fragment| {
+                        offer(&keys[part.pixel], key(part.distance, 0));
+                    });
+                });
+            }
+            Ink::Blended(sums) => {
+                batch.for_each(|Task { node, run, .. }| {
+                    let paint = stage.paint(node);
+                    // Of the point whose parts come.
+                    let mut point = (usize::MAX, [0; 3]);
+                    stage.draw(node, run, grid, |index, part: Fragment| {
+                        let foremost = depth_of(keys[part.pixel].load(Ordering::Relaxed));
+                        // In f32, as the foremost is: so it is never behind itself.
+                        let distance = depth_of(key(part.distance, 0));
+                        if f64::from(distance) - part.radius <= f64::from(foremost) {
+                            if point.0 != index {
+                                point = (index, paint.color(index));
+                            }
+                            sums[part.pixel].add(point.1, part.r_squared);
+                        }
+                    });
+                });
+            }
+            Ink::Counted(counts) => {
+                batch.for_each(|Task { node, run, .. }| {
+                    stage.draw(node, run, grid, |_, part: Fragment| {
+                        offer(&keys[part.pixel], key(part.distance, 0));
+                        let more = |count: u32| count.checked_add(1);
+                        // At the largest number it stays.
+                        let _ = counts[part.pixel].fetch_update(
+                            Ordering::Relaxed,
+                            Ordering::Relaxed,
+                            more,
+                        );
+                    });
                 });
             }
         }
     }
 
     /// Looks up the colours of the batch's points that are seen.
-    fn take_colors(
-        &mut self,
-        settings: &RenderSettings,
-        clouds: &[Arc<Manifest>],
-        around: &Surroundings,
-        nodes: &[&DrawNode],
-        starts: &[usize],
-    ) {
-        let colors: Vec<_> = nodes
-            .iter()
-            .map(|n| {
-                let surface = NodeSurface::of(settings, &clouds[n.cloud], &n.points);
-                NodeColor::of(around, n.cloud, &clouds[n.cloud].lattice, &n.points, &surface)
-            })
-            .collect();
-        self.keys.par_iter_mut().zip(&mut self.colors).with_min_len(4096).for_each(
-            |(key, color)| {
-                let key = key.get_mut();
-                let number = (*key & u64::from(u32::MAX)) as usize;
-                if number == 0 || *key == EMPTY {
-                    return;
-                }
-                let node = starts.partition_point(|start| *start <= number) - 1;
-                let index = number - starts[node];
-                *color = colors[node].color(index, nodes[node].points.positions[index][2]);
-                *key &= !u64::from(u32::MAX);
-            },
-        );
+    fn take_colors(&mut self, stage: &Stage, batch: &Batch) {
+        let paints: Vec<_> = batch.nodes().iter().map(|node| stage.paint(node)).collect();
+        let samples = self.keys.par_iter_mut().zip(&mut self.colors);
+        samples.with_min_len(TASK_SAMPLES).for_each(|(key, color)| {
+            let key = key.get_mut();
+            let number = (*key & u64::from(u32::MAX)) as usize;
+            if number == 0 || *key == EMPTY {
+                return;
+            }
+            let (node, index) = batch.find(number);
+            *color = paints[node].color(index);
+            *key &= !u64::from(u32::MAX);
+        });
     }
 
-    /// Colour and distance of a pixel; `None` where nothing was drawn.
-    pub fn pixel(&self, index: usize) -> Option<([u8; 3], f32)> {
+    /// Completes the colours when everything is drawn; tells what was counted.
+    pub fn dry(&mut self) -> Option<PointsPerPixel> {
+        let colors = self.colors.par_iter_mut();
+        match &mut self.ink {
+            Ink::Nearest => None,
+            Ink::Blended(sums) => {
+                let samples = colors.zip(sums).with_min_len(TASK_SAMPLES);
+                samples.for_each(|(color, sums)| *color = sums.mean());
+                None
+            }
+            Ink::Counted(counts) => {
+                let counts: Vec<u32> = counts.iter_mut().map(|count| *count.get_mut()).collect();
+                let told = PointsPerPixel::of(&counts);
+                let samples = colors.zip(&counts).with_min_len(TASK_SAMPLES);
+                samples.for_each(|(color, count)| *color = density::color(*count, told.largest));
+                Some(told)
+            }
+        }
+    }
+
+    /// The canvas' size.
+    pub const fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// Colour and distance of a sample; `None` where nothing was drawn.
+    #[inline]
+    pub fn sample(&self, index: usize) -> Option<([u8; 3], f32)> {
         let key = self.keys[index].load(Ordering::Relaxed);
-        (key != EMPTY).then(|| (self.colors[index], f32::from_bits((key >> 32) as u32)))
+        (key != EMPTY).then(|| (self.colors[index], depth_of(key)))
+    }
+
+    /// Distance of a sample; `None` where nothing was drawn and beside the canvas.
+    #[inline]
+    pub fn depth(&self, column: i64, row: i64) -> Option<f32> {
+        let Grid { width, height } = self.grid;
+        let column = usize::try_from(column).ok().filter(|column| *column < width)?;
+        let row = usize::try_from(row).ok().filter(|row| *row < height)?;
+        let key = self.keys[row * width + column].load(Ordering::Relaxed);
+        (key != EMPTY).then(|| depth_of(key))
     }
 }
 
+fn filled<T>(count: usize, make: impl FnMut() -> T) -> Vec<T> {
+    let mut all = Vec::new();
+    all.resize_with(count, make);
+    all
+}
+
 #[inline]
-fn offer(pixel: &AtomicU64, key: u64) {
+fn key(distance: f64, number: usize) -> u64 {
+    // What is too far for f32 (or no number: scenes beyond all measure) is at its end. Numbers fit:
+    // see `Batch::MOST_POINTS`.
+    let distance = distance.abs().min(f64::from(f32::MAX)) as f32;
+    u64::from(distance.to_bits()) << 32 | number as u64
+}
+
+#[inline]
+const fn depth_of(key: u64) -> f32 {
+    f32::from_bits((key >> 32) as u32)
+}
+
+#[inline]
+fn offer(sample: &AtomicU64, key: u64) {
     // Most points are hidden: a plain load is cheaper than a read-modify-write.
-    if key < pixel.load(Ordering::Relaxed) {
-        pixel.fetch_min(key, Ordering::Relaxed);
+    if key < sample.load(Ordering::Relaxed) {
+        sample.fetch_min(key, Ordering::Relaxed);
     }
 }

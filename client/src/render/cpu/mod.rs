@@ -1,17 +1,23 @@
 //! The CPU renderer, in f64: the truth that pictures are tested against, and what draws where there
 //! is no GPU adapter.
 //!
-//! A point is projected once and offered to the pixels that it covers with an atomic minimum
-//! (`canvas`), from all cores at once. Not a rasteriser with tiles: sorting points into tiles costs
-//! more than the rare contention that it avoids.
+//! A point is projected once and each part of its splat (`footprint`) is offered to its sample
+//! with an atomic minimum (`canvas`), from all cores at once. Not a rasteriser with tiles: sorting
+//! points into tiles costs more than the rare contention that it avoids.
 
+mod batch;
+mod blend;
 mod canvas;
+mod eye_dome;
 mod footprint;
+mod paint;
+mod resolve;
+mod stage;
 mod truth;
 
 pub use truth::TruthRenderer;
 
-use crate::render::{Frame, FrameStatistics, RenderError, RenderSettings, Scene};
+use crate::render::{DrawNode, Frame, RenderError, RenderSettings, Scene};
 
 /// Draws on the CPU. Follows the rules of [`Splat`](crate::render::Splat) to the letter.
 #[derive(Debug, Clone, Copy, Default)]
@@ -23,12 +29,17 @@ impl CpuRenderer {
     /// # Errors
     /// [`RenderError::Settings`] and [`RenderError::Scene`] where the input cannot be drawn.
     pub fn render(&self, scene: &Scene, settings: &RenderSettings) -> Result<Frame, RenderError> {
-        let mut renderer = TruthRenderer::new(settings, scene.clouds, scene.tree(), 1)?;
+        let renderer = TruthRenderer::new(settings, scene.clouds, scene.tree(), 1)?;
+        let mut renderer = renderer.of_nodes_in_memory();
         let nodes = scene.ordered()?;
-        let statistics = FrameStatistics::of(&nodes);
-        for node in nodes {
-            renderer.add_node(node.clone())?;
+        for pass in 0..renderer.passes() {
+            if pass > 0 {
+                renderer.next_pass()?;
+            }
+            for node in &nodes {
+                renderer.add_node(DrawNode::clone(node))?;
+            }
         }
-        Ok(Frame { picture: renderer.finish(), statistics })
+        renderer.finish()
     }
 }

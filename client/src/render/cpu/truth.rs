@@ -1,26 +1,25 @@
 //! The truth: every point of the cloud, supersampled, no levels of detail.
 //!
 //! Nodes come one after the other and are drawn in batches, so that a dataset of any size passes
-//! through. Each pixel is `samples` by `samples` samples, box-filtered: their colours (background
-//! included) are averaged as they are coded, the values that a display takes and that errors are
-//! measured on. A pixel's depth is that of its nearest sample. Splats have the size that they have
-//! in a picture of the same settings, at least one pixel (not one sample): the truth is the same
-//! picture, better sampled. A [`Splat::Point`](crate::render::Splat::Point) is a one-pixel square,
-//! placed to the sample.
+//! through; for blended splats it passes twice. Each pixel is `samples` by `samples` samples,
+//! box-filtered: their colours (background included) are averaged as they are coded, the values that
+//! a display takes and that errors are measured on. A pixel's depth is that of its nearest sample.
+//! Splats have the size that they have in a picture of the same settings, at least one pixel (not
+//! one sample): the truth is the same picture, better sampled. A
+//! [`Splat::Point`] is a one-pixel square, placed to the sample. Counts of points per pixel are what
+//! they are: they have one sample a pixel, always.
 
 use std::sync::Arc;
 
 use lodestream_protocol::Manifest;
-use rayon::prelude::*;
 
-use super::canvas::{BATCH_POINTS, Canvas};
+use super::{batch::Batch, blend, canvas::Canvas, resolve::resolve, stage::Stage};
 use crate::{
     engine::DrawNode,
     render::{
-        Picture, RenderError, VisibleTree,
-        scene::{Scene, Surroundings},
+        ColorMode, Frame, FrameStatistics, RenderError, Shading, Splat, VisibleTree,
+        scene::Scene,
         settings::{LARGEST_SIDE_PX, RenderSettings},
-        view::View,
     },
 };
 
@@ -31,22 +30,30 @@ const GATHER_POINTS: usize = 1 << 21;
 const LARGEST_SAMPLES: u64 = 1 << 29;
 
 /// Draws every point it is given.
+///
+/// ```text
+/// for pass in 0..renderer.passes() {
+///     if pass > 0 { renderer.next_pass()?; }
+///     for node in all { renderer.add_node(node)?; }
+/// }
+/// let frame = renderer.finish()?;
+/// ```
 pub struct TruthRenderer {
-    settings: RenderSettings,
-    samples: u32,
-    clouds: Vec<Arc<Manifest>>,
-    around: Surroundings,
-    tree: VisibleTree,
-    view: View,
+    stage: Stage,
     canvas: Canvas,
+    gather_points: usize,
     gathered: Vec<DrawNode>,
     gathered_points: usize,
+    /// What was drawn in the passes before this one.
+    earlier: Vec<FrameStatistics>,
+    /// What was drawn in this one.
+    drawn: FrameStatistics,
 }
 
 impl TruthRenderer {
     /// A renderer for all points of `clouds`, with `samples` by `samples` samples a pixel (1 to
-    /// 16). It holds 12 bytes a sample. `tree` is of all nodes that will be added, for sizes that
-    /// adapt to them.
+    /// 16). It holds 11 bytes a sample, 43 for blended splats. `tree` is of all nodes that will be
+    /// added, for sizes that adapt to them.
     ///
     /// # Errors
     /// [`RenderError::Settings`] where the settings cannot be drawn.
@@ -65,89 +72,103 @@ impl TruthRenderer {
         if !(1..=16).contains(&samples) {
             return Err(too_large());
         }
+        let (mut settings, mut samples) = (*settings, samples);
+        if settings.color == ColorMode::Density {
+            (settings.splat, settings.shading, samples) = (Splat::Point, Shading::default(), 1);
+        }
         debug_assert!(u64::from(LARGEST_SIDE_PX) * 16 < u64::from(u32::MAX));
-        let sides = [width * samples, height * samples];
-        if u64::from(sides[0]) * u64::from(sides[1]) > LARGEST_SAMPLES {
+        if u64::from(width * samples) * u64::from(height * samples) > LARGEST_SAMPLES {
             return Err(too_large());
         }
-        let around = Surroundings::of(clouds, settings.color);
-        let view = View::new(settings, samples, around.farthest(settings.camera.eye));
+        let stage = Stage::new(settings, samples, clouds, tree);
         Ok(Self {
-            settings: *settings,
-            samples,
-            clouds: clouds.to_vec(),
-            around,
-            tree,
-            view,
-            canvas: Canvas::new(sides.map(|side| side as usize)),
+            canvas: Canvas::new(&stage),
+            stage,
+            gather_points: GATHER_POINTS,
             gathered: Vec::new(),
             gathered_points: 0,
+            earlier: Vec::new(),
+            drawn: FrameStatistics::default(),
         })
+    }
+
+    /// For nodes that are in memory anyway: gathers as many as can be drawn at once, so that colours
+    /// are looked up once.
+    pub(super) const fn of_nodes_in_memory(mut self) -> Self {
+        self.gather_points = Batch::MOST_POINTS;
+        self
+    }
+
+    /// How many times all nodes must be added, with [`next_pass`](Self::next_pass) called in between.
+    #[must_use]
+    pub const fn passes(&self) -> u32 {
+        self.canvas.passes()
     }
 
     /// Takes a node. Of points of equal depth, those of earlier nodes are seen.
     ///
     /// # Errors
-    /// [`RenderError::Scene`] where the node is of no cloud.
+    /// [`RenderError::Scene`] where the node is of no cloud, or where there are more points than can
+    /// be blended (68 billion).
     pub fn add_node(&mut self, node: DrawNode) -> Result<(), RenderError> {
-        Scene { clouds: &self.clouds, nodes: std::slice::from_ref(&node) }.ordered()?;
+        Scene { clouds: &self.stage.clouds, nodes: std::slice::from_ref(&node) }.ordered()?;
         let points = node.points.positions.len();
-        if self.gathered_points + points > GATHER_POINTS {
+        if points > self.gather_points.saturating_sub(self.gathered_points) {
             self.draw_gathered();
         }
-        debug_assert!(points <= BATCH_POINTS);
+        debug_assert!(points <= Batch::MOST_POINTS);
+        self.drawn.nodes += 1;
+        self.drawn.points += points as u64;
+        if self.passes() > 1 && self.drawn.points > blend::MOST_POINTS {
+            let most = blend::MOST_POINTS;
+            return Err(RenderError::Scene(format!("more than {most} points to blend")));
+        }
         self.gathered_points += points;
         self.gathered.push(node);
         Ok(())
     }
 
+    /// Begins the next pass: all nodes must be added again.
+    ///
+    /// # Errors
+    /// [`RenderError::Scene`] where there is no further pass.
+    pub fn next_pass(&mut self) -> Result<(), RenderError> {
+        let passes = self.passes();
+        if self.is_last_pass() {
+            return Err(RenderError::Scene(format!("a picture of {passes} passes has no further")));
+        }
+        self.draw_gathered();
+        self.canvas.turn();
+        self.earlier.push(std::mem::take(&mut self.drawn));
+        Ok(())
+    }
+
+    fn is_last_pass(&self) -> bool {
+        self.earlier.len() + 1 == self.passes() as usize
+    }
+
     fn draw_gathered(&mut self) {
-        let nodes: Vec<_> = self.gathered.iter().collect();
-        let (settings, tree) = (&self.settings, &self.tree);
-        self.canvas.draw(&self.view, settings, tree, &self.clouds, &self.around, &nodes);
+        self.canvas.draw(&self.stage, &Batch::of(&self.gathered));
         self.gathered.clear();
         self.gathered_points = 0;
     }
 
-    /// The picture of all points taken.
-    #[must_use]
-    pub fn finish(mut self) -> Picture {
+    /// The picture of all points taken, with the statistics of one pass.
+    ///
+    /// # Errors
+    /// [`RenderError::Scene`] where a pass is missing, or where passes were of different points.
+    pub fn finish(mut self) -> Result<Frame, RenderError> {
+        if !self.is_last_pass() || self.earlier.iter().any(|pass| *pass != self.drawn) {
+            let passes = self.passes();
+            let points: Vec<_> =
+                self.earlier.iter().chain([&self.drawn]).map(|pass| pass.points).collect();
+            return Err(RenderError::Scene(format!(
+                "a picture of {passes} passes over the same points was given {points:?}"
+            )));
+        }
         self.draw_gathered();
-        let [width, height] = self.settings.size_px;
-        let samples = self.samples as usize;
-        let pixels = width as usize * height as usize;
-        let mut picture = Picture {
-            width,
-            height,
-            rgba8: vec![255; 4 * pixels],
-            depth: vec![f32::INFINITY; pixels],
-        };
-        let (canvas, background) = (&self.canvas, self.settings.background);
-        let width = width as usize;
-        let rows = picture.rgba8.par_chunks_exact_mut(4 * width);
-        rows.zip(picture.depth.par_chunks_exact_mut(width)).enumerate().for_each(
-            |(y, (colors, depths))| {
-                for (x, (color, depth)) in colors.chunks_exact_mut(4).zip(depths).enumerate() {
-                    let mut sums = [0u32; 3];
-                    for sample_row in 0..samples {
-                        let first = (y * samples + sample_row) * width * samples + x * samples;
-                        for sample in first..first + samples {
-                            let (rgb, d) =
-                                canvas.pixel(sample).unwrap_or((background, f32::INFINITY));
-                            *depth = depth.min(d);
-                            for (sum, component) in sums.iter_mut().zip(rgb) {
-                                *sum += u32::from(component);
-                            }
-                        }
-                    }
-                    let count = (samples * samples) as u32;
-                    for (component, sum) in color.iter_mut().zip(sums) {
-                        // Rounded to nearest; the mean of bytes is a byte.
-                        *component = ((sum + count / 2) / count) as u8;
-                    }
-                }
-            },
-        );
-        picture
+        let points_per_pixel = self.canvas.dry();
+        let picture = resolve(&self.canvas, &self.stage);
+        Ok(Frame { picture, statistics: self.drawn, points_per_pixel })
     }
 }

@@ -1,92 +1,123 @@
-//! Which pixels a splat covers: the rule, in f64. The WGSL twins are `shaders/footprint_*.wgsl`.
+//! Which pixels a splat covers and how far away its parts are: the rules of
+//! [`Splat`](crate::render::Splat), in f64. The WGSL twins are `shaders/footprint_*.wgsl`.
+//!
+//! Each kind is a type that is made once per run of points of a node; the loops over points and
+//! pixels are compiled for each of them, so that no choice is left inside.
 
-use crate::render::{settings::Splat, view::Projected};
+mod cone;
+mod facing;
+mod mesh;
+mod oriented;
 
-/// Calls `cover` with the index (row by row) of every covered pixel of a picture of the given size.
-///
-/// A point of this function's kind is a square: its size is that of a pixel.
-#[inline]
-pub(super) fn for_each_pixel(
-    splat: Splat,
-    at: &Projected,
-    size: f64,
-    [width, height]: [usize; 2],
-    mut cover: impl FnMut(usize),
-) {
-    let columns = span(at.x, size, width);
-    let radius_squared = 0.25 * size * size;
-    for row in span(at.y, size, height) {
-        for column in columns.clone() {
-            let inside = match splat {
-                Splat::Point | Splat::Square => true,
-                _ => {
-                    let dx = column as f64 + 0.5 - at.x;
-                    let dy = row as f64 + 0.5 - at.y;
-                    let holds_center = dx.abs() <= 0.5
-                        && dy.abs() <= 0.5
-                        && column == at.x as usize
-                        && row == at.y as usize;
-                    dx * dx + dy * dy <= radius_squared || holds_center
-                }
-            };
-            if inside {
-                cover(row * width + column);
-            }
-        }
+use std::ops::Range;
+
+use glam::DVec3;
+
+pub(super) use cone::{Cone, Paraboloid};
+pub(super) use facing::{Dot, Facing, Flat, Square};
+pub(super) use mesh::Mesh;
+pub(super) use oriented::Oriented;
+
+use crate::render::view::Projected;
+
+/// A kind of splat.
+pub(super) trait Footprint {
+    /// Whether the size of a splat matters.
+    const SIZED: bool = true;
+
+    /// Calls `take` with every part of a splat.
+    fn cover(&self, spot: &Spot, grid: Grid, take: impl FnMut(Fragment));
+}
+
+/// A point that is drawn.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spot {
+    /// Which of the node's points.
+    pub index: usize,
+    /// In view space.
+    pub place: DVec3,
+    /// On the picture.
+    pub at: Projected,
+    /// Half its size.
+    pub radius_px: f64,
+}
+
+impl Spot {
+    /// World units that the radius is at the spot's distance. (Where not even f64 can tell, 0.)
+    #[inline]
+    pub fn radius(&self) -> f64 {
+        let radius = self.radius_px / self.at.scale;
+        if radius.is_finite() { radius } else { 0.0 }
+    }
+
+    /// Column and row of the pixel that holds the centre; it may lie beyond the last, and does where
+    /// the centre is beside the first.
+    #[inline]
+    pub fn center_pixel(&self) -> [usize; 2] {
+        [self.at.x, self.at.y].map(|c| if c >= 0.0 { floor(c) } else { usize::MAX })
     }
 }
 
-/// The pixels of a row or column of `length` whose middles m satisfy
-/// `center - size / 2 < m <= center + size / 2`.
+/// What a splat is on a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Fragment {
+    /// Row by row.
+    pub pixel: usize,
+    /// Along the view direction, world units.
+    pub distance: f64,
+    /// Square of the pixel's place within the splat: 0 is the centre, 1 the rim.
+    pub r_squared: f64,
+    /// Of the splat, world units.
+    pub radius: f64,
+}
+
+/// Columns and rows of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Grid {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+/// The pixels of a row or column of `length` whose middles are above `low` and at most `high`.
 #[inline]
-fn span(center: f64, size: f64, length: usize) -> std::ops::Range<usize> {
-    // Casts from float saturate: what lies before the picture is 0, what lies behind it is more
-    // than `length`. NaN is 0 and cannot come here: View::project refuses it.
-    let first = (center - 0.5 * size + 0.5).floor() as usize;
-    let end = (center + 0.5 * size + 0.5).floor() as usize;
-    first.min(length)..end.min(length)
+fn span(low: f64, high: f64, length: usize) -> Range<usize> {
+    // NaN is 0: nothing.
+    floor(low + 0.5).min(length)..floor(high + 0.5).min(length)
+}
+
+/// All pixels whose middles are `low` to `high`, and perhaps one that lies lower.
+#[inline]
+fn wide_span(low: f64, high: f64, length: usize) -> Range<usize> {
+    span(low - 1e-6, high, length)
+}
+
+/// The whole part of a number; 0 where that is negative or NaN.
+#[inline]
+fn floor(number: f64) -> usize {
+    // Casts from float saturate. Those to i32 are one instruction and a correction; no picture has
+    // so many pixels on a side.
+    number.max(0.0) as i32 as usize
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn pixels(splat: Splat, x: f64, y: f64, size: f64) -> Vec<(usize, usize)> {
-        let mut covered = Vec::new();
-        let at = Projected { x, y, distance: 1.0, scale: 1.0 };
-        for_each_pixel(splat, &at, size, [8, 6], |i| covered.push((i % 8, i / 8)));
-        covered
+    #[test]
+    fn a_span_holds_the_middles_above_its_low_end() {
+        assert_eq!(span(1.5, 3.5, 9), 2..4);
+        assert_eq!(span(1.4, 3.4, 9), 1..3);
+        assert_eq!(wide_span(1.5, 3.5, 9), 1..4);
+        assert_eq!(span(-8.0, 80.0, 9), 0..9);
     }
 
     #[test]
-    fn the_smallest_splat_is_the_pixel_that_holds_its_centre() {
-        for splat in [Splat::Point, Splat::Square, Splat::Circle] {
-            for (x, y) in [(3.0, 2.0), (3.01, 2.99), (3.5, 2.5), (3.999, 2.001)] {
-                assert_eq!(pixels(splat, x, y, 1.0), [(3, 2)], "{splat:?} at {x}, {y}");
-            }
+    fn a_span_of_what_is_no_place_is_empty() {
+        for far in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300] {
+            assert!(span(far - 2.0, far + 2.0, 9).is_empty(), "{far}");
+            assert!(wide_span(far - 2.0, far + 2.0, 9).is_empty(), "{far}");
         }
-    }
-
-    #[test]
-    fn a_square_covers_the_pixels_whose_middle_it_holds() {
-        assert_eq!(pixels(Splat::Square, 3.0, 2.0, 2.0), [(2, 1), (3, 1), (2, 2), (3, 2)]);
-        assert_eq!(pixels(Splat::Square, 3.6, 2.4, 1.9).len(), 4);
-        assert_eq!(pixels(Splat::Square, 3.5, 2.5, 3.0).len(), 9);
-    }
-
-    #[test]
-    fn a_circle_leaves_the_corners_out() {
-        let circle = pixels(Splat::Circle, 3.5, 2.5, 5.0);
-        assert_eq!(circle.len(), 21);
-        assert!(!circle.contains(&(1, 0)) && circle.contains(&(2, 0)));
-    }
-
-    #[test]
-    fn splats_are_cut_at_the_edges_of_the_picture() {
-        assert_eq!(pixels(Splat::Square, 0.0, 0.0, 4.0).len(), 4);
-        assert_eq!(pixels(Splat::Square, 8.0, 6.0, 4.0).len(), 4);
-        assert_eq!(pixels(Splat::Circle, 4.0, 3.0, 1000.0).len(), 48);
-        assert!(pixels(Splat::Square, -5.0, 3.0, 4.0).is_empty());
-        assert!(pixels(Splat::Circle, 1e300, 3.0, 4.0).is_empty());
     }
 }

@@ -1,0 +1,51 @@
+//! From samples to pixels: lit, then averaged as they are coded. A pixel's depth is that of its
+//! nearest sample.
+
+use rayon::prelude::*;
+
+use super::{canvas::Canvas, eye_dome::Shades, stage::Stage};
+use crate::render::Picture;
+
+/// The picture of a canvas that is dry.
+pub(super) fn resolve(canvas: &Canvas, stage: &Stage) -> Picture {
+    let [width, height] = stage.settings.size_px;
+    let pixels = width as usize * height as usize;
+    let mut picture =
+        Picture { width, height, rgba8: vec![255; 4 * pixels], depth: vec![f32::INFINITY; pixels] };
+    let eye_dome = stage.settings.shading.eye_dome.as_ref();
+    let shades = eye_dome.map(|e| Shades::of(canvas, e, &stage.view, stage.samples));
+    let (width, samples) = (width as usize, stage.samples as usize);
+    let background = stage.settings.background;
+    let sample = |column: usize, row: usize| {
+        let index = row * canvas.grid().width + column;
+        let Some((color, distance)) = canvas.sample(index) else {
+            return (background, f32::INFINITY);
+        };
+        let Some(shades) = &shades else { return (color, distance) };
+        let shade = shades.shade(column, row, distance);
+        (color.map(|c| (f64::from(c) * shade).round() as u8), distance)
+    };
+    let rows = picture.rgba8.par_chunks_exact_mut(4 * width);
+    rows.zip(picture.depth.par_chunks_exact_mut(width)).enumerate().for_each(
+        |(y, (colors, depths))| {
+            for (x, (color, depth)) in colors.chunks_exact_mut(4).zip(depths).enumerate() {
+                let mut sums = [0u32; 3];
+                for row in y * samples..(y + 1) * samples {
+                    for column in x * samples..(x + 1) * samples {
+                        let (rgb, distance) = sample(column, row);
+                        *depth = depth.min(distance);
+                        for (sum, component) in sums.iter_mut().zip(rgb) {
+                            *sum += u32::from(component);
+                        }
+                    }
+                }
+                let count = stage.samples * stage.samples;
+                for (component, sum) in color.iter_mut().zip(sums) {
+                    // Rounded to nearest; the mean of bytes is a byte.
+                    *component = ((sum + count / 2) / count) as u8;
+                }
+            }
+        },
+    );
+    picture
+}
