@@ -288,11 +288,10 @@ fn build_in_pool(
     let coordinates: Vec<InputCoordinates> = read
         .kinds
         .iter()
-        .zip(&read.writer.bounds)
-        .map(|(&kind, &bounds)| InputCoordinates { kind, bounds })
+        .zip(read.writer.bounds.iter().zip(&read.writer.steps))
+        .map(|(&kind, (&bounds, &steps))| InputCoordinates { kind, bounds, steps })
         .collect();
     let choice = grid::choose(&coordinates, points, config.scale)?;
-    warnings.extend(choice.note.clone());
     let raw = read.writer.finish()?;
     let mut store = raw.place(choice.placements, choice.lattice, &read.schema);
     let spilled = matches!(store, Store::File(_));
@@ -303,6 +302,10 @@ fn build_in_pool(
     let row_bytes = read.schema.row_bytes;
     let scan = distribute::count(&mut store, &mut plan, capacity, row_bytes, &check)?;
     check_chunks(&plan, capacity, config.memory_bytes)?;
+    if scan.rounding > 0.0 {
+        let step = choice.lattice.scale;
+        warnings.push(format!("coordinates are rounded to multiples of {step:e}"));
+    }
     let constant = constant_attributes(&read.schema, &scan.constant_bytes);
     let layout = Layout::new(&read.schema, &constant, &scan.first_row);
     let mut manifest = Manifest {
@@ -691,6 +694,7 @@ fn join<C: MortonCode>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::readers::las::tests::scan::{Compression, Scan};
     use crate::verify::{VerifyConfig, verify};
     use lodestream_protocol::{Dataset, NormalCone, ScalarType};
     use proptest::prelude::*;
@@ -874,6 +878,65 @@ mod tests {
         assert!(of(child(1)).is_some_and(|width| width <= 2), "{widths:?}");
         // Where the point without direction is, any direction may be.
         assert_eq!(of(NodeKey::ROOT), Some(255), "{widths:?}");
+    }
+
+    /// A LAS file of points on steps of a centimetre, written at another scale and offset.
+    fn las(folder: &Path, name: &str, centimetres: &[[i32; 3]], scale: f64, offset: i32) -> String {
+        let mut scan = Scan::new(0, centimetres.len(), 0, Compression::None);
+        let header = &mut scan.header;
+        (header.x_scale_factor, header.y_scale_factor, header.z_scale_factor) =
+            (scale, scale, scale);
+        let zero = f64::from(offset);
+        (header.x_offset, header.y_offset, header.z_offset) = (zero, zero, zero);
+        let steps = (0.01 / scale).round() as i32;
+        for (record, point) in scan.points.chunks_exact_mut(20).zip(centimetres) {
+            record.fill(0);
+            for a in 0..3 {
+                let native = (point[a] - 100 * offset) * steps;
+                record[4 * a..4 * a + 4].copy_from_slice(&native.to_le_bytes());
+            }
+        }
+        let path = folder.join(name);
+        std::fs::write(&path, scan.bytes()).expect("temporary folder");
+        path.display().to_string()
+    }
+
+    #[test]
+    fn parts_with_scales_and_offsets_of_their_own_make_what_the_whole_does() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let points: Vec<[i32; 3]> =
+            (0..3000).map(|i| [i * 7919 % 10_000, i * 31 % 10_007, i % 10]).collect();
+        let whole = vec![las(folder.path(), "whole.las", &points, 0.01, 0)];
+        let parts = [(0.001, 0), (0.01, 3), (0.0001, 0), (0.005, -7)];
+        let parts: Vec<String> = points
+            .chunks(750)
+            .zip(parts)
+            .enumerate()
+            .map(|(i, (points, (scale, offset)))| {
+                las(folder.path(), &format!("{i}.las"), points, scale, offset)
+            })
+            .collect();
+        let built = [&whole, &parts].map(|inputs| {
+            let mut config = config(folder.path(), &[], 2, 1 << 30);
+            config.inputs = inputs.clone();
+            config.columns = None;
+            let report = build(&config, &Quiet).expect("builds");
+            assert_eq!((report.scale, report.largest_coordinate_error), (0.01, 0.0));
+            let position = report.columns[0].bytes;
+            let against = VerifyConfig {
+                dataset: config.output,
+                against: whole.clone(),
+                columns: None,
+                cancel: Arc::default(),
+            };
+            (position, verify(&against, &Quiet).expect("opens"))
+        });
+        assert_eq!(built[0].0, built[1].0, "bytes of the positions");
+        for (_, verified) in built {
+            let against = verified.against.expect("compared");
+            assert_eq!(against.largest_coordinate_error, 0.0);
+            assert!(against.identical);
+        }
     }
 
     #[test]

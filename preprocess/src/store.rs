@@ -13,7 +13,7 @@ use lodestream_protocol::Lattice;
 
 use crate::{
     error::{Error, Result},
-    grid::{NativeBounds, Placement},
+    grid::{NativeBounds, NativeSteps, Placement},
     readers::{BLOCK_POINTS, Positions},
     schema::Schema,
 };
@@ -58,6 +58,8 @@ pub struct StoreWriter {
     folder: PathBuf,
     /// Native bounds per input.
     pub bounds: Vec<NativeBounds>,
+    /// Where the integer coordinates of each input lie.
+    pub steps: Vec<NativeSteps>,
     /// Points per input.
     pub points: Vec<u64>,
 }
@@ -89,6 +91,7 @@ impl StoreWriter {
             spill: None,
             folder: folder.to_path_buf(),
             bounds: vec![NativeBounds::EMPTY; inputs],
+            steps: vec![NativeSteps::default(); inputs],
             points: vec![0; inputs],
         }
     }
@@ -101,6 +104,9 @@ impl StoreWriter {
         let input = block.input as usize;
         self.points[input] += block.positions.len() as u64;
         self.bounds[input].merge(&native_bounds(&block.positions));
+        if let Positions::Scaled(positions) = &block.positions {
+            self.steps[input].look(positions);
+        }
         if self.spill.is_none() && self.memory_bytes + block.size_bytes() > self.limit_bytes {
             let file = tempfile::tempfile_in(&self.folder)
                 .map_err(Error::io(&self.folder, "cannot create a temporary file"))?;
@@ -225,36 +231,7 @@ fn coalesce(blocks: Vec<Block>) -> Vec<Block> {
 }
 
 fn place(raw: RawBlock, placements: &[Placement], lattice: &Lattice) -> (Block, f64) {
-    let placement = &placements[raw.input as usize];
-    let mut rounding: f64 = 0.0;
-    let positions = match (raw.positions, placement) {
-        (Positions::Scaled(native), Placement::Exact { factor, shift }) => {
-            // In place: the same memory, wrapping arithmetic modulo 2^32 on values that fit.
-            let factor = factor.map(|f| f as u32);
-            let shift = shift.map(|s| s as u32);
-            let mut positions: Vec<[u32; 3]> = bytemuck::cast_vec(native);
-            for p in &mut positions {
-                *p = std::array::from_fn(|a| p[a].wrapping_mul(factor[a]).wrapping_add(shift[a]));
-            }
-            positions
-        }
-        (Positions::Scaled(native), placement) => native
-            .into_iter()
-            .map(|p| {
-                let (q, r) = placement.place(lattice, p.map(f64::from));
-                rounding = rounding.max(r);
-                q
-            })
-            .collect(),
-        (Positions::Float(native), placement) => native
-            .into_iter()
-            .map(|p| {
-                let (q, r) = placement.place(lattice, p);
-                rounding = rounding.max(r);
-                q
-            })
-            .collect(),
-    };
+    let (positions, rounding) = placements[raw.input as usize].place(lattice, raw.positions);
     (Block { positions, rows: raw.rows }, rounding)
 }
 

@@ -1,8 +1,8 @@
 //! The integer lattice that every coordinate lives on.
 //!
 //! `world = offset + scale * (origin + q)`. `scale` and `offset` are those of the source where it
-//! has them, so that a point's world coordinate comes out bit-identical to the source's own
-//! arithmetic; `origin` (an integer) moves the root cube to the cloud. The root cube's side is
+//! has them and uses all its steps, so that a point's world coordinate comes out bit-identical to
+//! the source's own arithmetic; `origin` (an integer) moves the root cube to the cloud. The root cube's side is
 //! `2^side_bits` lattice units: cubes, octants and Morton codes are shifts and masks.
 
 use serde::{Deserialize, Serialize};

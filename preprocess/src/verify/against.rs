@@ -72,7 +72,8 @@ pub(super) fn compare(
             scaled => scaled,
         };
         comparison.dropped += read.dropped.iter().map(|(_, n)| n).sum::<u64>();
-        let coordinates = InputCoordinates { kind, bounds: writer.bounds[0] };
+        let (bounds, steps) = (writer.bounds[0], writer.steps[0]);
+        let coordinates = InputCoordinates { kind, bounds, steps };
         let placement = grid::placement_on(&manifest.lattice, &coordinates);
         let store = writer.finish()?.place(vec![placement], manifest.lattice, &schema);
         let Store::Memory { blocks, rounding } = store else {

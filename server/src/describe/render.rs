@@ -77,6 +77,10 @@ fn groups(d: &Description) -> String {
         [group.to_owned(), column.to_owned(), count(bytes), format!("{per_point:.3}")]
     };
     for group in &d.groups {
+        if let [column] = &group.columns[..] {
+            rows.push(row(&group.name, &column.name, group.bytes, group.bytes_per_point));
+            continue;
+        }
         rows.push(row(&group.name, "", group.bytes, group.bytes_per_point));
         for column in &group.columns {
             rows.push(row("", &column.name, column.bytes, column.bytes_per_point));
