@@ -1,80 +1,19 @@
 //! `lodestream shot`: the real binary, a real server, real pictures.
 
-use std::{
-    net::{Ipv4Addr, SocketAddr},
-    path::Path,
-    process::{Command, Output},
-};
+#[path = "common/world.rs"]
+mod world;
 
-use lodestream_client::render::{Picture, ssim};
-use lodestream_preprocess::{BuildConfig, Method, Progress, build};
-use lodestream_server::{RunningServer, ServeConfig, spawn};
+use std::process::Command;
 
-struct Silent;
+use lodestream_client::render::ssim;
 
-impl Progress for Silent {
-    fn phase(&self, _name: &str, _total: u64, _unit: &str) {}
-    fn advance(&self, _amount: u64) {}
-    fn warn(&self, _line: &str) {}
-}
-
-/// A folder with a dataset of a simulated scan in it, and a server for it.
-struct World {
-    folder: tempfile::TempDir,
-    server: RunningServer,
-}
+use world::{World, refused, run};
 
 impl World {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let config = BuildConfig {
-            inputs: vec!["sim:courtyard?points=60k&seed=3".into()],
-            output: folder.path().join("courtyard.lods"),
-            method: Method::default(),
-            grid: 128,
-            memory_bytes: 256 << 20,
-            threads: Some(1),
-            drop_attributes: Vec::new(),
-            columns: None,
-            scale: None,
-            cancel: Default::default(),
-        };
-        build(&config, &Silent).expect("built");
-        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = spawn(ServeConfig::new(folder.path(), address)).expect("serving");
-        Self { folder, server }
-    }
-
-    fn file(&self, name: &str) -> String {
-        self.folder.path().join(name).display().to_string()
-    }
-
     /// `lodestream shot` of the served dataset into `NAME.png` and `NAME.json`.
     fn shot(&self, name: &str, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_lodestream"));
-        command
-            .args(["shot", &format!("{}/courtyard", self.server.url()), "--size", "320x200"])
-            .args(["-o", &self.file(&format!("{name}.png"))])
-            .args(["--report", &self.file(&format!("{name}.json"))])
-            .args(args);
-        command
+        self.shot_of(&self.source(), &format!("{name}.png"), name, args)
     }
-
-    fn picture(&self, name: &str) -> Picture {
-        Picture::read_png(Path::new(&self.file(&format!("{name}.png")))).expect("a picture")
-    }
-
-    fn report(&self, name: &str) -> serde_json::Value {
-        let text = std::fs::read_to_string(self.file(&format!("{name}.json"))).expect("a report");
-        serde_json::from_str(&text).expect("JSON")
-    }
-}
-
-fn run(command: &mut Command) -> Output {
-    let output = command.output().expect("the binary runs");
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{command:?}: {error}");
-    output
 }
 
 #[test]
@@ -133,13 +72,7 @@ fn a_camera_file_is_looked_through() {
 #[test]
 fn what_cannot_be_drawn_is_refused_in_one_line() {
     let world = World::new();
-    let refused = |args: &[&str]| {
-        let output = world.shot("refused", args).output().expect("the binary runs");
-        assert_eq!(output.status.code(), Some(1), "{args:?}");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(said.lines().filter(|line| line.starts_with("error: ")).count(), 1, "{said}");
-        said
-    };
+    let refused = |args: &[&str]| refused(&mut world.shot("refused", args));
     let cpu = ["--renderer", "cpu"];
     assert!(refused(&[&cpu[..], &["--camera", "no-such.json"]].concat()).contains("no-such.json"));
     assert!(refused(&[&cpu[..], &["--against", "no-such.png"]].concat()).contains("no-such.png"));

@@ -1,7 +1,11 @@
-//! `shot`: one picture of datasets, streamed as a viewer would or drawn from every point.
+//! `shot`: a picture of datasets, or many along a camera path, streamed as a viewer would or drawn
+//! from every point.
 
+mod patience;
 mod report;
 mod stream;
+mod tour;
+mod tour_report;
 mod truth;
 
 use std::{
@@ -12,12 +16,13 @@ use std::{
 };
 
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum, error::ErrorKind, value_parser};
 use glam::DVec3;
 use lodestream_protocol::Manifest;
 use lodestream_server::commands::{print, write_report};
 
 pub use report::ShotReport;
+pub use tour_report::{Arrival, FrameReport, PathReport, TourReport};
 
 use crate::{
     camera::Camera,
@@ -30,14 +35,21 @@ const BACKGROUND: [u8; 3] = [18, 18, 24];
 /// Problems that are written out; the report has them all.
 const PROBLEMS_SHOWN: usize = 5;
 
-/// Draw a picture of datasets
+/// Most pictures along a path.
+const MAX_FRAMES: u32 = 1_000_000;
+
+/// Longest `--time-step`.
+const LONGEST_STEP: Duration = Duration::from_secs(3600);
+
+/// Draw a picture of datasets, or many along a camera path
 #[derive(Debug, Clone, Args)]
+#[command(group(ArgGroup::new("pace").args(["frames", "time_step"]).multiple(true)))]
 pub struct ShotArgs {
     /// Dataset files, URLs of them, or a server's address with a dataset's name
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<String>,
-    /// The picture to write
-    #[arg(short, long, value_name = "OUT.png")]
+    /// The picture to write; with --path, the folder for frame_0000.png and so on
+    #[arg(short, long, value_name = "OUT.png|DIR")]
     pub output: PathBuf,
     /// Width and height in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = size)]
@@ -46,6 +58,29 @@ pub struct ShotArgs {
     /// 'overview'
     #[arg(long, value_name = "FILE.json|overview", default_value = "overview")]
     pub camera: String,
+    /// Draw along a camera path: a path file, or a generator with options, such as
+    /// 'orbit?seconds=20&turns=2' (or flythrough, zoom, teleport, random-walk; see PATHS.md)
+    #[arg(
+        long,
+        value_name = "FILE.json|GENERATOR",
+        requires = "pace",
+        conflicts_with_all = ["camera", "against"]
+    )]
+    pub path: Option<String>,
+    /// How many pictures: evenly spread over the path, each waited for until it is complete
+    #[arg(
+        long,
+        value_name = "N",
+        requires = "path",
+        value_parser = value_parser!(u32).range(1..=i64::from(MAX_FRAMES))
+    )]
+    pub frames: Option<u32>,
+    /// Wait for no picture: follow the path in real time, and draw every SECONDS what has come by then
+    #[arg(long, value_name = "SECONDS", requires = "path", value_parser = time_step)]
+    pub time_step: Option<Duration>,
+    /// Write the path to this file
+    #[arg(long, value_name = "FILE.json", requires = "path")]
+    pub write_path: Option<PathBuf>,
     /// Most points to draw (the truth draws all)
     #[arg(long, value_name = "POINTS", default_value_t = 1_000_000)]
     pub budget: u64,
@@ -67,7 +102,7 @@ pub struct ShotArgs {
     /// Tell the structural similarity to this picture, such as one of '--renderer truth'
     #[arg(long, value_name = "FILE.png")]
     pub against: Option<PathBuf>,
-    /// Give up after this many seconds without a complete picture
+    /// Give up after this many seconds without a complete picture (along a path: each)
     #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = seconds)]
     pub timeout: Duration,
 }
@@ -94,6 +129,13 @@ pub(crate) struct Shot {
 /// # Errors
 /// Where a source cannot be read, the view cannot be drawn or a file cannot be written.
 pub fn run(args: ShotArgs) -> anyhow::Result<ExitCode> {
+    if args.renderer == RendererName::Truth && args.time_step.is_some() {
+        let why = "--renderer truth draws complete pictures: give --frames without --time-step";
+        clap::Error::raw(ErrorKind::ArgumentConflict, format!("{why}\n")).exit();
+    }
+    if let Some(path) = &args.path {
+        return tour::run(&args, path);
+    }
     let camera = match args.camera.as_str() {
         "overview" => None,
         file => Some(read_camera(Path::new(file))?),
@@ -111,11 +153,15 @@ pub fn run(args: ShotArgs) -> anyhow::Result<ExitCode> {
         write_report(path, &report)?;
     }
     print(&report.summary())?;
-    for problem in report.problems.iter().take(PROBLEMS_SHOWN) {
+    Ok(tell_problems(&report.problems))
+}
+
+/// Says what a picture lacks: it is there, but not what it should be.
+fn tell_problems(problems: &[String]) -> ExitCode {
+    for problem in problems.iter().take(PROBLEMS_SHOWN) {
         eprintln!("warning: {problem}");
     }
-    // The picture is there, but it is not what it should be.
-    Ok(if report.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    if problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 impl ShotArgs {
@@ -174,6 +220,14 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().and_then(|s| Duration::try_from_secs_f64(s).ok());
     seconds.filter(|s| !s.is_zero()).ok_or_else(|| "expected seconds above 0".into())
+}
+
+fn time_step(text: &str) -> Result<Duration, String> {
+    let step = seconds(text)?;
+    if step > LONGEST_STEP {
+        return Err(format!("expected at most {} seconds", LONGEST_STEP.as_secs()));
+    }
+    Ok(step)
 }
 
 #[cfg(test)]

@@ -1,17 +1,17 @@
-//! A shot by the streaming engine: what a viewer would show once it has settled.
+//! Drawing by the streaming engine: what a viewer would show.
 
 use std::{
-    sync::Arc,
+    sync::{Arc, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
 use lodestream_protocol::Manifest;
 
-use super::{RendererName, Shot, ShotArgs, ShotReport};
+use super::{RendererName, Shot, ShotArgs, ShotReport, patience};
 use crate::{
     camera::Camera,
     engine::{Engine, EngineConfig, EngineError, FramePlan, View},
-    render::{CpuRenderer, Frame, RenderError, RenderSettings, Renderer, Scene},
+    render::{Coloring, CpuRenderer, Frame, RenderError, RenderSettings, Renderer, Scene},
     source::Source,
 };
 
@@ -21,6 +21,89 @@ const RESIDENT_BYTES: u64 = 1 << 30;
 /// How often a failed source is looked for while waiting for the first plan.
 const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 
+/// One engine and one renderer for all pictures: what is loaded and uploaded for one is there for
+/// the next.
+pub(super) struct Stream {
+    pub engine: Engine,
+    pub clouds: Vec<Arc<Manifest>>,
+    /// How each cloud is coloured.
+    pub colorings: Vec<Coloring>,
+    /// Why the GPU does not draw, where it was asked to.
+    pub fallback: Option<String>,
+    renderer: Renderer,
+}
+
+impl Stream {
+    /// Opens the sources and the renderer.
+    ///
+    /// # Errors
+    /// Where a source cannot be read in time; where `cancel` is set.
+    pub fn open(args: &ShotArgs, cancel: &AtomicBool) -> anyhow::Result<Self> {
+        let start = Instant::now();
+        let sources = args.sources.iter().map(|text| Source::parse(text));
+        let sources = sources.collect::<Result<Vec<_>, _>>()?;
+        let config = EngineConfig {
+            point_budget: args.budget,
+            attributes: args.color.attribute().map(str::to_owned).into_iter().collect(),
+            ..EngineConfig::default()
+        };
+        let engine = Engine::start(sources, config)?;
+        // While the first bytes are on their way.
+        let mut fallback = None;
+        let renderer = match args.renderer {
+            RendererName::Gpu => Renderer::open(RESIDENT_BYTES, &mut |e| tell(e, &mut fallback)),
+            RendererName::Cpu | RendererName::Truth => Renderer::Cpu(CpuRenderer),
+        };
+        let left = args.timeout.saturating_sub(start.elapsed());
+        let boots = patience::wait(cancel, left, |turn| engine.wait_open(turn))?;
+        let clouds: Vec<_> = boots.iter().map(|boot| Arc::new(boot.manifest.clone())).collect();
+        let colorings = args.colorings(&clouds);
+        Ok(Self { engine, clouds, colorings, fallback, renderer })
+    }
+
+    /// Asks for the attributes that pictures of such settings need, whatever their cameras.
+    pub fn set_attributes(&self, settings: &RenderSettings) {
+        let needed = self.clouds.iter().flat_map(|cloud| {
+            let name = |a: usize| cloud.attributes[a].name.clone();
+            settings.attributes(cloud).into_iter().map(name).collect::<Vec<_>>()
+        });
+        self.engine.set_attributes(needed.collect());
+    }
+
+    /// Looks through the settings' camera; returns the view's number.
+    pub fn set_view(&self, settings: &RenderSettings) -> u64 {
+        self.engine.set_view(View { camera: settings.camera, size_px: settings.size_px })
+    }
+
+    /// Draws what there is.
+    ///
+    /// # Errors
+    /// Where the view cannot be drawn.
+    pub fn draw(
+        &mut self,
+        plan: &FramePlan,
+        settings: &RenderSettings,
+    ) -> Result<Frame, RenderError> {
+        let scene = Scene { clouds: &self.clouds, nodes: &plan.nodes };
+        self.renderer.render(&scene, settings, &mut |e| tell(e, &mut self.fallback))
+    }
+
+    /// What draws: `gpu: ADAPTER` or `cpu`.
+    pub fn renderer_name(&self) -> String {
+        self.renderer.name()
+    }
+
+    /// As a report names the colours.
+    pub fn color_names(&self) -> Vec<&'static str> {
+        self.colorings.iter().map(Coloring::name).collect()
+    }
+}
+
+fn tell(e: &RenderError, fallback: &mut Option<String>) {
+    eprintln!("note: {e}; drawing on the CPU");
+    *fallback = Some(e.to_string());
+}
+
 /// Streams what the view needs within the budget, and draws it.
 ///
 /// # Errors
@@ -28,58 +111,31 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Shot> {
     let start = Instant::now();
     let left = || args.timeout.saturating_sub(start.elapsed());
-    let sources = args.sources.iter().map(|text| Source::parse(text));
-    let sources = sources.collect::<Result<Vec<_>, _>>()?;
-    let config = EngineConfig {
-        point_budget: args.budget,
-        attributes: args.color.attribute().map(str::to_owned).into_iter().collect(),
-        ..EngineConfig::default()
-    };
-    let engine = Engine::start(sources, config)?;
+    // Nothing is lost where an interrupt simply ends the program.
+    let mut stream = Stream::open(args, &AtomicBool::new(false))?;
+    let settings = args.settings(camera, &stream.clouds)?;
+    stream.set_attributes(&settings);
+    stream.set_view(&settings);
 
-    // While the first bytes are on their way.
-    let mut fallback = None;
-    let mut told = |e: &RenderError| {
-        eprintln!("note: {e}; drawing on the CPU");
-        fallback = Some(e.to_string());
-    };
-    let mut renderer = match args.renderer {
-        RendererName::Gpu => Renderer::open(RESIDENT_BYTES, &mut told),
-        RendererName::Cpu | RendererName::Truth => Renderer::Cpu(CpuRenderer),
-    };
-
-    let boots = engine.wait_open(left())?;
-    let clouds: Vec<_> = boots.iter().map(|boot| Arc::new(boot.manifest.clone())).collect();
-    let settings = args.settings(camera, &clouds)?;
-    let colorings = args.colorings(&clouds);
-    let needed = clouds.iter().flat_map(|cloud| {
-        let name = |a: usize| cloud.attributes[a].name.clone();
-        settings.attributes(cloud).into_iter().map(name).collect::<Vec<_>>()
-    });
-    engine.set_attributes(needed.collect());
-    engine.set_view(View { camera: settings.camera, size_px: settings.size_px });
-
-    let mut drawn =
-        |plan: &FramePlan| draw_plan(&mut renderer, plan, &clouds, &settings, &mut told);
-    let mut plan = wait_first(&engine, left())?;
-    let mut frame = drawn(&plan)?;
+    let mut plan = wait_first(&stream.engine, left())?;
+    let mut frame = stream.draw(&plan, &settings)?;
     let first_picture = start.elapsed();
     if !plan.settled {
-        plan = engine.wait_settled(left())?;
-        frame = drawn(&plan)?;
+        plan = stream.engine.wait_settled(left())?;
+        frame = stream.draw(&plan, &settings)?;
     }
     let settled_picture = start.elapsed();
 
-    let stats = engine.stats();
+    let stats = stream.engine.stats();
     let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
     let report = ShotReport {
         sources: args.sources.clone(),
         picture: args.output.clone(),
         size_px: args.size,
         camera: serde_json::from_str(&settings.camera.to_json())?,
-        renderer: renderer.name(),
-        fallback,
-        colors: colorings.iter().map(|coloring| coloring.name()).collect(),
+        renderer: stream.renderer_name(),
+        fallback: stream.fallback.clone(),
+        colors: stream.color_names(),
         points: frame.statistics.points,
         nodes: frame.statistics.nodes,
         requests: stats.since_start.totals.requests,
@@ -94,16 +150,6 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
         ssim: None,
     };
     Ok(Shot { picture: frame.picture, report })
-}
-
-fn draw_plan(
-    renderer: &mut Renderer,
-    plan: &FramePlan,
-    clouds: &[Arc<Manifest>],
-    settings: &RenderSettings,
-    told: &mut dyn FnMut(&RenderError),
-) -> Result<Frame, RenderError> {
-    renderer.render(&Scene { clouds, nodes: &plan.nodes }, settings, told)
 }
 
 /// The first plan that has points, or the complete one where it has none.

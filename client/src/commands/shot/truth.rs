@@ -3,22 +3,22 @@
 use std::{
     sync::{
         Arc,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
     time::Instant,
 };
 
 use anyhow::Context;
 use lodestream_preprocess::Progress;
-use lodestream_protocol::{Dataset, Node, ReadAt, Refinement};
+use lodestream_protocol::{Dataset, Manifest, Node, ReadAt, Refinement};
 use lodestream_server::commands::TerminalProgress;
 use rayon::prelude::*;
 
-use super::{Shot, ShotArgs, ShotReport};
+use super::{Shot, ShotArgs, ShotReport, patience};
 use crate::{
     camera::Camera,
     engine::DrawNode,
-    render::{Coloring, FrameStatistics, TruthRenderer, VisibleTree},
+    render::{Coloring, Frame, RenderSettings, TruthRenderer, VisibleTree},
     source::{BlockingSource, Source},
 };
 
@@ -28,44 +28,104 @@ const SAMPLES: u32 = 4;
 /// Points that are read and decoded at a time, by all cores.
 const BATCH_POINTS: u64 = 1 << 20;
 
+/// The sources, open, with all of their nodes known.
+pub(super) struct Truth {
+    pub clouds: Vec<Arc<Manifest>>,
+    /// How each cloud is coloured.
+    pub colorings: Vec<Coloring>,
+    datasets: Vec<Dataset<Metered>>,
+    /// Of each cloud, the nodes that hold every point once.
+    hierarchies: Vec<Vec<Node>>,
+    progress: TerminalProgress,
+}
+
+impl Truth {
+    /// Opens the sources.
+    ///
+    /// # Errors
+    /// Where one cannot be read.
+    pub fn open(args: &ShotArgs) -> anyhow::Result<Self> {
+        let datasets = args.sources.iter().map(|text| open(text));
+        let datasets = datasets.collect::<anyhow::Result<Vec<_>>>()?;
+        let clouds: Vec<_> = datasets.iter().map(|d| Arc::new(d.manifest().clone())).collect();
+        let colorings = args.colorings(&clouds);
+        let mut hierarchies = Vec::new();
+        for (dataset, text) in datasets.iter().zip(&args.sources) {
+            hierarchies.push(full_resolution(dataset).with_context(|| text.clone())?);
+        }
+        let progress = TerminalProgress::default();
+        Ok(Self { clouds, colorings, datasets, hierarchies, progress })
+    }
+
+    /// Draws all points; `what` is being drawn, for the user.
+    ///
+    /// # Errors
+    /// Where a source cannot be read or the view cannot be drawn; where `cancel` is set.
+    pub fn draw(
+        &self,
+        args: &ShotArgs,
+        settings: &RenderSettings,
+        what: &str,
+        cancel: &AtomicBool,
+    ) -> anyhow::Result<Frame> {
+        let drawn = |(cloud, nodes): (usize, &Vec<Node>)| {
+            nodes.iter().map(|n| (cloud, n.key, n.spacing)).collect::<Vec<_>>()
+        };
+        let tree = VisibleTree::of(self.hierarchies.iter().enumerate().flat_map(drawn));
+        let mut renderer = TruthRenderer::new(settings, &self.clouds, tree, SAMPLES)?;
+        self.progress.phase(what, self.points() * u64::from(renderer.passes()), "points");
+        for pass in 0..renderer.passes() {
+            if pass > 0 {
+                renderer.next_pass()?;
+            }
+            for (cloud, (dataset, text)) in self.datasets.iter().zip(&args.sources).enumerate() {
+                let (nodes, groups) =
+                    (&self.hierarchies[cloud], settings.groups(&self.clouds[cloud]));
+                let done = |points| {
+                    self.progress.advance(points);
+                    patience::go_on(cancel)
+                };
+                draw_cloud(&mut renderer, cloud, dataset, nodes, &groups, done)
+                    .with_context(|| text.clone())?;
+            }
+        }
+        let frame = renderer.finish()?;
+        self.progress.finish();
+        Ok(frame)
+    }
+
+    /// Points of all clouds.
+    pub fn points(&self) -> u64 {
+        self.clouds.iter().map(|cloud| cloud.points).sum()
+    }
+
+    /// Requests sent and bytes asked for so far.
+    pub fn read_so_far(&self) -> (u64, u64) {
+        let sum = |count: fn(&Metered) -> &AtomicU64| {
+            self.datasets.iter().map(|d| count(d.source()).load(Ordering::Relaxed)).sum()
+        };
+        (sum(|source| &source.requests), sum(|source| &source.bytes))
+    }
+
+    /// As a report names the colours.
+    pub fn color_names(&self) -> Vec<&'static str> {
+        self.colorings.iter().map(Coloring::name).collect()
+    }
+}
+
 /// Draws all points of the sources.
 ///
 /// # Errors
 /// Where a source cannot be read or the view cannot be drawn.
 pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Shot> {
     let start = Instant::now();
-    let datasets = args.sources.iter().map(|text| open(text));
-    let datasets = datasets.collect::<anyhow::Result<Vec<_>>>()?;
-    let clouds: Vec<_> = datasets.iter().map(|d| Arc::new(d.manifest().clone())).collect();
-    let settings = args.settings(camera, &clouds)?;
-    let colorings = args.colorings(&clouds);
-    let mut hierarchies = Vec::new();
-    for (dataset, text) in datasets.iter().zip(&args.sources) {
-        hierarchies.push(full_resolution(dataset).with_context(|| text.clone())?);
-    }
-    let drawn = |(cloud, nodes): (usize, &Vec<Node>)| {
-        nodes.iter().map(|n| (cloud, n.key, n.spacing)).collect::<Vec<_>>()
-    };
-    let tree = VisibleTree::of(hierarchies.iter().enumerate().flat_map(drawn));
-    let mut renderer = TruthRenderer::new(&settings, &clouds, tree, SAMPLES)?;
-    let progress = TerminalProgress::default();
-    progress.phase("draw", clouds.iter().map(|cloud| cloud.points).sum(), "points");
-    let mut statistics = FrameStatistics::default();
-    for (cloud, (dataset, text)) in datasets.iter().zip(&args.sources).enumerate() {
-        let (nodes, groups) = (&hierarchies[cloud], settings.groups(&clouds[cloud]));
-        draw_cloud(&mut renderer, cloud, dataset, nodes, &groups, |nodes, points| {
-            statistics.nodes += nodes;
-            statistics.points += points;
-            progress.advance(points);
-        })
-        .with_context(|| text.clone())?;
-    }
-    let picture = renderer.finish()?.picture;
-    progress.finish();
+    let truth = Truth::open(args)?;
+    let settings = args.settings(camera, &truth.clouds)?;
+    // Nothing is lost where an interrupt simply ends the program.
+    let Frame { picture, statistics, .. } =
+        truth.draw(args, &settings, "draw", &AtomicBool::new(false))?;
     let milliseconds = start.elapsed().as_secs_f64() * 1e3;
-    let sum = |count: fn(&Metered) -> &AtomicU64| {
-        datasets.iter().map(|d| count(d.source()).load(Ordering::Relaxed)).sum()
-    };
+    let (requests, bytes) = truth.read_so_far();
     let report = ShotReport {
         sources: args.sources.clone(),
         picture: args.output.clone(),
@@ -73,11 +133,11 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
         camera: serde_json::from_str(&settings.camera.to_json())?,
         renderer: "truth".into(),
         fallback: None,
-        colors: colorings.iter().map(Coloring::name).collect(),
+        colors: truth.color_names(),
         points: statistics.points,
         nodes: statistics.nodes,
-        requests: sum(|source| &source.requests),
-        bytes: sum(|source| &source.bytes),
+        requests,
+        bytes,
         first_picture_ms: milliseconds,
         settled_picture_ms: milliseconds,
         coverage: picture.coverage(),
@@ -114,7 +174,7 @@ fn draw_cloud(
     dataset: &Dataset<Metered>,
     nodes: &[Node],
     groups: &[usize],
-    mut done: impl FnMut(u64, u64),
+    done: impl Fn(u64) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
     let mut rest = nodes;
     while !rest.is_empty() {
@@ -130,7 +190,7 @@ fn draw_cloud(
         let read = |node: &Node| dataset.read_node(node, groups);
         let decoded = batch.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
         for (node, points) in batch.iter().zip(decoded) {
-            done(1, points.positions.len() as u64);
+            done(points.positions.len() as u64)?;
             let (key, spacing) = (node.key, node.spacing);
             renderer.add_node(DrawNode { cloud, key, spacing, points: Arc::new(points) })?;
         }
