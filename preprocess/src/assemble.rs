@@ -1,6 +1,6 @@
 //! Writes the dataset file: pages, payloads in the order clients ask for them, one rename at the end.
 
-use std::{collections::HashMap, fs, io::Write, path::Path};
+use std::{collections::HashMap, io::Write, path::Path};
 
 use lodestream_protocol::{
     BOOT_SPECULATIVE_BYTES, Boot, HierarchyPage, Manifest, Node, NodeKey, PageRef, PayloadRef,
@@ -11,6 +11,7 @@ use crate::{
     blobs::FinishedBlobs,
     encode::OutNode,
     error::{Error, Result},
+    target::Target,
 };
 
 /// Most nodes in a page, unless one level alone has more: about 150 KiB.
@@ -167,57 +168,25 @@ pub fn write(
     let index = Boot::encode(manifest, &encoded[0], top, tail_bytes)
         .map_err(|source| Error::Format { path: output.display().to_string(), source })?;
 
-    let folder = match output.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
     let failed = |e| Error::io(output, "cannot write")(e);
-    // A name that no server takes for a dataset; it goes away with an error or an interrupt.
-    let mut file = tempfile::Builder::new()
-        .prefix(".lodestream-")
-        .suffix(".part")
-        .tempfile_in(folder)
-        .map_err(failed)?;
-    {
-        let mut out = std::io::BufWriter::with_capacity(1 << 20, file.as_file_mut());
-        out.write_all(&index).map_err(failed)?;
-        for group in 0..groups {
-            for &i in pages.iter().flat_map(|page| &page.nodes) {
-                let node = &nodes[i];
-                let bytes = node.payloads[group].bytes;
-                blobs.copy(node.part, group, node.starts[group], bytes, &mut |payload| {
-                    out.write_all(payload).map_err(failed)
-                })?;
-                advance(u64::from(bytes))?;
-            }
+    let mut file = Target::create(output)?;
+    file.write_all(&index).map_err(failed)?;
+    for group in 0..groups {
+        for &i in pages.iter().flat_map(|page| &page.nodes) {
+            let node = &nodes[i];
+            let bytes = node.payloads[group].bytes;
+            blobs.copy(node.part, group, node.starts[group], bytes, &mut |payload| {
+                file.write_all(payload).map_err(failed)
+            })?;
+            advance(u64::from(bytes))?;
         }
-        out.write_all(&tail).map_err(failed)?;
-        out.flush().map_err(failed)?;
     }
-    file.as_file().sync_all().map_err(failed)?;
-    set_permissions(file.as_file()).map_err(failed)?;
-    file.persist(output).map_err(|e| failed(e.error))?;
-    // The rename itself must survive a power cut.
-    if let Ok(folder) = fs::File::open(folder) {
-        let _ = folder.sync_all();
-    }
+    file.write_all(&tail).map_err(failed)?;
+    file.finish()?;
     Ok(Written {
         file_bytes: index.len() as u64 + tail_bytes,
         index_bytes: (index.len() + tail.len()) as u64,
     })
-}
-
-/// Temporary files are private; a dataset is as readable as any new file (0644 less the umask
-/// cannot be asked for without changing the process; 0644 is what static hosts need).
-#[cfg(unix)]
-fn set_permissions(file: &fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn set_permissions(_: &fs::File) -> std::io::Result<()> {
-    Ok(())
 }
 
 /// Payloads of group 0, from the root on, that fit the first request a client makes: at least the

@@ -37,6 +37,7 @@ use crate::{
     schedule,
     schema::{RowMap, Schema},
     store::{RawBlock, Store, StoreWriter},
+    target::folder_of,
     tree::Tree,
 };
 
@@ -255,10 +256,7 @@ fn build_in_pool(
         true => Err(Error::Interrupted),
         false => Ok(()),
     };
-    let folder = match config.output.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(&config.output);
     check_output(&config.output, folder)?;
     let mut warnings: Vec<String> = Vec::new();
     let mut phases = Phases { progress, started: begun, done: Vec::new(), name: String::new() };
@@ -471,9 +469,10 @@ fn check_disk(opened: &[OpenedInput], config: &BuildConfig, folder: &Path) -> Re
     // Where the system does not tell, the build finds out.
     let Ok(free) = fs4::available_space(folder) else { return Ok(()) };
     if free < needed {
+        let memory = if temporary > 0 { " or raise --memory" } else { "" };
         return Err(Error::Setup(format!(
             "{}: the build needs about {} MiB of disk, {} MiB are free; choose another place for the \
-             output or raise --memory",
+             output{memory}",
             folder.display(),
             needed >> 20,
             free >> 20

@@ -15,7 +15,7 @@ pub enum Error {
         message: String,
     },
     /// Reading or writing a file failed.
-    #[error("{}: {action}: {source}", path.display())]
+    #[error("{}: {action}: {source}{}", path.display(), advice(source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -40,6 +40,16 @@ pub enum Error {
     Interrupted,
 }
 
+/// What to do about an error of the system, where that is not plain from its words.
+fn advice(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "; make room, or write to another place"
+        }
+        _ => "",
+    }
+}
+
 /// [`std::result::Result`] with this crate's [`enum@Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -53,5 +63,18 @@ impl Error {
     pub fn io(path: impl Into<PathBuf>, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { path, action, source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_told_with_what_to_do() {
+        let error = Error::io("out.lods", "cannot write")(io::ErrorKind::StorageFull.into());
+        let text = error.to_string();
+        assert!(text.starts_with("out.lods: cannot write: "), "{text}");
+        assert!(text.ends_with("; make room, or write to another place"), "{text}");
     }
 }

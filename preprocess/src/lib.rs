@@ -25,6 +25,7 @@ mod schema;
 pub mod sim;
 mod sort;
 mod store;
+mod target;
 mod tree;
 mod verify;
 pub mod writers;

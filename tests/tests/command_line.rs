@@ -262,6 +262,53 @@ fn an_interrupted_build_says_so_and_cleans_up() {
     assert_eq!(folder.names(), Vec::<String>::new());
 }
 
+/// Runs with files of at most `blocks` times 512 bytes: to a program the same as a disk that fills up,
+/// but no administrator is needed to set it up.
+#[cfg(unix)]
+fn with_small_files(blocks: u32, arguments: &[&str]) -> Output {
+    let program = program("lodestream").expect("built beside the tests");
+    Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f \"$0\"; exec \"$@\"", &blocks.to_string()])
+        .arg(program)
+        .args(arguments)
+        .output()
+        .expect("starts")
+}
+
+#[cfg(unix)]
+#[test]
+fn a_disk_that_fills_up_is_one_line_and_leaves_nothing() {
+    let folder = Folder::new();
+    let [scan, dataset] = ["scan.las", "scan.lods"].map(|name| folder.path(name));
+    succeeds(&["build", SCAN, "-o", &dataset]);
+    succeeds(&["export", &dataset, "-o", &scan]);
+    let whole = fs::read(&dataset).expect("built");
+    fs::remove_file(&dataset).expect("there");
+    let bytes = whole.len() as u64;
+    let before = folder.names();
+
+    // The dataset itself; the points on their way, which take more.
+    let build = ["build", &scan, "-o", &dataset];
+    let spilled = [&build[..], &["--memory", "1MiB"]].concat();
+    for (arguments, bytes, expected) in [
+        (&build[..], bytes - 1000, "scan.lods: cannot write: "),
+        (&spilled, bytes / 2, "cannot write a temporary file: "),
+    ] {
+        let blocks = u32::try_from(bytes / 512).expect("small");
+        let output = with_small_files(blocks, arguments);
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        let errors: Vec<&str> = stderr.lines().filter(|l| l.starts_with("error: ")).collect();
+        assert!(errors.len() == 1 && errors[0].contains(expected), "{stderr}");
+        assert_eq!(folder.names(), before);
+    }
+    // What was there before stays as it was.
+    fs::write(&dataset, &whole).expect("writable");
+    let output = with_small_files(100, &build);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    assert!(fs::read(&dataset).expect("there") == whole);
+}
+
 #[test]
 fn the_demo_writes_pictures_and_a_page() {
     let folder = Folder::new();

@@ -7,7 +7,6 @@
 mod las;
 mod ply;
 mod source;
-mod target;
 
 use std::path::Path;
 

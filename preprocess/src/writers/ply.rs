@@ -18,9 +18,11 @@ use rayon::prelude::*;
 use super::{
     ExportBlock, ExportInfo, PointWriter,
     source::{Source, is_exact_as_f64, is_per_point, range},
+};
+use crate::{
+    error::{Error, Result},
     target::Target,
 };
-use crate::error::{Error, Result};
 
 /// Points that a thread turns into vertices at a time.
 const TASK_POINTS: usize = 8192;

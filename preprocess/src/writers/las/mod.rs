@@ -25,8 +25,11 @@ use self::{
     plan::Plan,
     records::{Tally, append},
 };
-use super::{ExportBlock, ExportInfo, PointWriter, target::Target};
-use crate::error::{Error, Result};
+use super::{ExportBlock, ExportInfo, PointWriter};
+use crate::{
+    error::{Error, Result},
+    target::Target,
+};
 
 /// Records that are gathered before they are written, bytes.
 const GATHERED_BYTES: usize = 4 << 20;
