@@ -16,40 +16,43 @@ struct Run {
 
 @group(2) @binding(0) var<uniform> run: Run;
 
-@compute @workgroup_size(CHUNK_POINTS)
-fn rasterise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) index: u32) {
+// Invocations of a workgroup: each takes several points, so that what is known of the node is read
+// once for all of them.
+const INVOCATIONS = 32u;
+
+@compute @workgroup_size(INVOCATIONS)
+fn rasterise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
     let chunk_index = run.first + group.y * run.row + group.x;
     if chunk_index >= run.end {
         return;
     }
     let chunk = chunks[chunk_index];
-    if index >= chunk.points {
-        return;
-    }
     let node = nodes[chunk.node];
-    let surfel = surfel_at(chunk, node, index);
-    if !surfel.visible {
-        return;
-    }
-    let shape = shape_of_surfel(node, surfel);
     let size = 2.0 * camera.half_size_px;
-    let box = box_of(shape);
-    // The pixels whose middles lie in the box; written so that a box that is none has no pixels.
-    let low = max(floor(box.xy), vec2(0.0));
-    let high = min(ceil(box.zw), size);
-    if !all(low < high) {
-        return;
-    }
     let width = u32(size.x);
-    let first = vec2<u32>(low);
-    let end = vec2<u32>(high);
-    // Owners count down, so that of equal depths the first drawn is the greatest.
-    let owner = 0xffffffffu - (chunk_index * CHUNK_POINTS + index);
-    for (var y = first.y; y < end.y; y++) {
-        for (var x = first.x; x < end.x; x++) {
-            let hit = hit(shape, vec2(f32(x), f32(y)) + 0.5);
-            if hit.covered {
-                offer(y * width + x, hit.depth, owner);
+    for (var index = local; index < chunk.points; index += INVOCATIONS) {
+        let surfel = surfel_at(chunk, node, index);
+        if !surfel.visible {
+            continue;
+        }
+        let shape = shape_of_surfel(node, surfel);
+        let box = box_of(shape);
+        // The pixels whose middles lie in the box; written so that a box that is none has no pixels.
+        let low = max(floor(box.xy), vec2(0.0));
+        let high = min(ceil(box.zw), size);
+        if !all(low < high) {
+            continue;
+        }
+        let first = vec2<u32>(low);
+        let end = vec2<u32>(high);
+        // Owners count down, so that of equal depths the first drawn is the greatest.
+        let owner = 0xffffffffu - (chunk_index * CHUNK_POINTS + index);
+        for (var y = first.y; y < end.y; y++) {
+            for (var x = first.x; x < end.x; x++) {
+                let hit = hit(shape, vec2(f32(x), f32(y)) + 0.5);
+                if hit.covered {
+                    offer(y * width + x, hit.depth, owner);
+                }
             }
         }
     }

@@ -78,12 +78,33 @@ fn record_at(chunk: Chunk, position_bits: u32, index: u32) -> Record {
 
 // Lattice units relative to the lowest corner of the node's points.
 fn read_position(record: Record) -> vec3<u32> {
-    let y_at = record.bit + record.bits.x;
+    let y_at = record.bits.x;
+    let z_at = y_at + record.bits.y;
+    if z_at + record.bits.z > 64u {
+        return vec3(
+            read_bits(record.first_word, record.bit, record.bits.x),
+            read_bits(record.first_word, record.bit + y_at, record.bits.y),
+            read_bits(record.first_word, record.bit + z_at, record.bits.z),
+        );
+    }
+    // All of it is in three words: shifted to where it begins, in two.
+    let word = record.first_word + (record.bit >> 5u);
+    let shift = record.bit & 31u;
+    let middle = words[word + 1u];
+    let low = words[word] >> shift | (middle << 1u) << (31u - shift);
+    let high = middle >> shift | (words[word + 2u] << 1u) << (31u - shift);
     return vec3(
-        read_bits(record.first_word, record.bit, record.bits.x),
-        read_bits(record.first_word, y_at, record.bits.y),
-        read_bits(record.first_word, y_at + record.bits.y, record.bits.z),
+        extractBits(low, 0u, record.bits.x),
+        window(low, high, y_at, record.bits.y),
+        window(low, high, z_at, record.bits.z),
     );
+}
+
+// `count` bits from bit `at` of two words.
+fn window(low: u32, high: u32, at: u32, count: u32) -> u32 {
+    let shift = at & 31u;
+    let across = low >> shift | (high << 1u) << (31u - shift);
+    return extractBits(select(high >> shift, across, at < 32u), 0u, count);
 }
 
 fn read_color(record: Record) -> u32 {

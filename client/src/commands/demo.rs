@@ -24,7 +24,7 @@ use serde::Serialize;
 use crate::{
     camera::{Camera, Projection},
     engine::{Engine, EngineConfig, View},
-    render::{ColorMode, RenderError, RenderSettings, Renderer, Scene},
+    render::{ColorMode, GpuConfig, RenderError, RenderSettings, Renderer, Scene},
     source::Source,
 };
 
@@ -32,8 +32,7 @@ use crate::{
 const DEFAULT_INPUT: &str = "sim:courtyard?points=2M&seed=1";
 /// Width and height of the pictures.
 const SIZE_PX: [u32; 2] = [1280, 720];
-/// Nodes that stay on the GPU from one picture to the next.
-const RESIDENT_BYTES: u64 = 1 << 30;
+
 /// Longest wait for a picture to be complete.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -126,7 +125,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
     let server = spawn(ServeConfig::new(&data, SocketAddr::from((Ipv4Addr::LOCALHOST, 0))))?;
     let url = format!("{}/datasets/{name}.lods", server.url());
     print(&format!("serving {url}\n"))?;
-    let mut renderer = Renderer::open(RESIDENT_BYTES, &mut tell_fallback);
+    let mut renderer = Renderer::open(GpuConfig::default(), &mut tell_fallback);
     print(&format!("drawing with {}\n", renderer.name()))?;
     let engine = Engine::start(vec![Source::parse(&url)?], EngineConfig::default())?;
     let boots = engine.wait_open(PATIENCE)?;

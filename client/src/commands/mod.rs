@@ -1,5 +1,6 @@
 //! The commands that need the client; the others are the server's.
 
+pub mod appearance;
 pub mod demo;
 pub mod export;
 pub mod shot;

@@ -1,22 +1,30 @@
 //! The renderer that there is: the GPU's, or the CPU's in its place.
 
-use crate::render::{CpuRenderer, Frame, GpuConfig, GpuRenderer, RenderError, RenderSettings, Scene};
+use crate::render::{
+    CpuRenderer, Frame, GpuConfig, GpuRenderer, RenderError, RenderSettings, Scene,
+};
 
 /// Draws on the GPU as long as there is one, then on the CPU: the same pictures.
 pub enum Renderer {
     /// With wgpu.
-    Gpu(Box<GpuRenderer>),
+    Gpu {
+        /// What draws.
+        gpu: Box<GpuRenderer>,
+        /// To open it anew, where it is lost.
+        config: GpuConfig,
+        /// Whether it has drawn anything yet.
+        proven: bool,
+    },
     /// On the CPU.
     Cpu(CpuRenderer),
 }
 
 impl Renderer {
-    /// The GPU renderer, keeping up to `resident_bytes` of nodes; where there is no usable GPU, the
-    /// CPU renderer, and `told` learns why.
+    /// The GPU renderer; where there is no usable GPU, the CPU renderer, and `told` learns why.
     #[must_use]
-    pub fn open(resident_bytes: u64, told: &mut dyn FnMut(&RenderError)) -> Self {
-        match GpuRenderer::new(GpuConfig { resident_bytes, ..GpuConfig::default() }) {
-            Ok(gpu) => Self::Gpu(Box::new(gpu)),
+    pub fn open(config: GpuConfig, told: &mut dyn FnMut(&RenderError)) -> Self {
+        match GpuRenderer::new(config) {
+            Ok(gpu) => Self::Gpu { gpu: Box::new(gpu), config, proven: false },
             Err(e) => {
                 told(&e);
                 Self::Cpu(CpuRenderer)
@@ -28,13 +36,14 @@ impl Renderer {
     #[must_use]
     pub fn name(&self) -> String {
         match self {
-            Self::Gpu(gpu) => format!("gpu: {}", gpu.adapter()),
+            Self::Gpu { gpu, .. } => format!("gpu: {}", gpu.adapter()),
             Self::Cpu(_) => "cpu".into(),
         }
     }
 
-    /// Draws a scene. Where the GPU fails, this and all further frames are drawn on the CPU, and
-    /// `told` learns why.
+    /// Draws a scene. A GPU that fails after it has drawn (it was reset, unplugged, or ran out of
+    /// memory) is opened anew; one that fails at once is given up, and this and all further frames
+    /// are drawn on the CPU. `told` learns why.
     ///
     /// # Errors
     /// [`RenderError::Settings`] and [`RenderError::Scene`] where the input cannot be drawn.
@@ -44,13 +53,19 @@ impl Renderer {
         settings: &RenderSettings,
         told: &mut dyn FnMut(&RenderError),
     ) -> Result<Frame, RenderError> {
-        if let Self::Gpu(gpu) = self {
+        while let Self::Gpu { gpu, config, proven } = self {
             match gpu.render(scene, settings) {
-                Err(e @ RenderError::Gpu(_)) => told(&e),
-                outcome => return outcome,
+                Err(e @ RenderError::Gpu(_)) => {
+                    told(&e);
+                    *self =
+                        if *proven { Self::open(*config, told) } else { Self::Cpu(CpuRenderer) };
+                }
+                outcome => {
+                    *proven = true;
+                    return outcome;
+                }
             }
         }
-        *self = Self::Cpu(CpuRenderer);
         CpuRenderer.render(scene, settings)
     }
 }

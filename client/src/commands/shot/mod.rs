@@ -26,11 +26,9 @@ pub use tour_report::{Arrival, FrameReport, PathReport, TourReport};
 
 use crate::{
     camera::Camera,
-    render::{ColorMode, Coloring, Picture, RenderSettings, Splat, SplatSize, ssim},
+    commands::appearance::Appearance,
+    render::{Coloring, Picture, RenderSettings, ssim},
 };
-
-/// Behind the points: dark, but not black, so that dark points are seen.
-const BACKGROUND: [u8; 3] = [18, 18, 24];
 
 /// Problems that are written out; the report has them all.
 const PROBLEMS_SHOWN: usize = 5;
@@ -84,15 +82,6 @@ pub struct ShotArgs {
     /// Most points to draw (the truth draws all)
     #[arg(long, value_name = "POINTS", default_value_t = 1_000_000)]
     pub budget: u64,
-    /// What a point covers: point, square or circle
-    #[arg(long, value_name = "SPLAT", default_value = "circle")]
-    pub splat: Splat,
-    /// How large it is, in pixels (2px) or world units (0.05w)
-    #[arg(long, value_name = "SIZE", default_value = "2px")]
-    pub splat_size: SplatSize,
-    /// Where colours come from: rgb, elevation, intensity or level
-    #[arg(long, value_name = "COLOR", default_value = "rgb")]
-    pub color: ColorMode,
     /// What draws
     #[arg(long, value_enum, default_value_t = RendererName::Gpu)]
     pub renderer: RendererName,
@@ -105,6 +94,9 @@ pub struct ShotArgs {
     /// Give up after this many seconds without a complete picture (along a path: each)
     #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = seconds)]
     pub timeout: Duration,
+    /// What it looks like.
+    #[command(flatten)]
+    pub appearance: Appearance,
 }
 
 /// Renderers, as the command line names them.
@@ -173,23 +165,15 @@ impl ShotArgs {
     ) -> anyhow::Result<RenderSettings> {
         let [width, height] = self.size.map(f64::from);
         let camera = camera.unwrap_or_else(|| overview(clouds, width / height));
-        let settings = RenderSettings {
-            splat: self.splat,
-            splat_size: self.splat_size,
-            color: self.color,
-            background: BACKGROUND,
-            ..RenderSettings::new(self.size, camera)
-        };
-        settings.check()?;
-        Ok(settings)
+        self.appearance.settings(self.size, camera)
     }
 
     /// How each cloud is coloured; says where that is not what was asked for.
     fn colorings(&self, clouds: &[Arc<Manifest>]) -> Vec<Coloring> {
         let colorings = clouds.iter().zip(&self.sources).map(|(cloud, source)| {
-            let coloring = Coloring::of(self.color, cloud);
-            if coloring.falls_back(self.color) {
-                let (asked, found) = (self.color.name(), coloring.name());
+            let coloring = Coloring::of(self.appearance.color, cloud);
+            if coloring.falls_back(self.appearance.color) {
+                let (asked, found) = (self.appearance.color.name(), coloring.name());
                 eprintln!("note: {source} has no {asked}: coloured by {found}");
             }
             coloring

@@ -11,12 +11,11 @@ use super::{RendererName, Shot, ShotArgs, ShotReport, patience};
 use crate::{
     camera::Camera,
     engine::{Engine, EngineConfig, EngineError, FramePlan, View},
-    render::{Coloring, CpuRenderer, Frame, RenderError, RenderSettings, Renderer, Scene},
+    render::{
+        Coloring, CpuRenderer, Frame, GpuConfig, RenderError, RenderSettings, Renderer, Scene,
+    },
     source::Source,
 };
-
-/// Nodes that stay on the GPU from the first picture to the last.
-const RESIDENT_BYTES: u64 = 1 << 30;
 
 /// How often a failed source is looked for while waiting for the first plan.
 const LOOK_INTERVAL: Duration = Duration::from_millis(50);
@@ -44,14 +43,19 @@ impl Stream {
         let sources = sources.collect::<Result<Vec<_>, _>>()?;
         let config = EngineConfig {
             point_budget: args.budget,
-            attributes: args.color.attribute().map(str::to_owned).into_iter().collect(),
+            // Most views need colours: they come with the first bytes.
+            attributes: args.appearance.color.attribute().map(str::to_owned).into_iter().collect(),
             ..EngineConfig::default()
         };
         let engine = Engine::start(sources, config)?;
         // While the first bytes are on their way.
         let mut fallback = None;
         let renderer = match args.renderer {
-            RendererName::Gpu => Renderer::open(RESIDENT_BYTES, &mut |e| tell(e, &mut fallback)),
+            RendererName::Gpu => {
+                let path = args.appearance.gpu_path;
+                let config = GpuConfig { path, ..GpuConfig::default() };
+                Renderer::open(config, &mut |e| tell(e, &mut fallback))
+            }
             RendererName::Cpu | RendererName::Truth => Renderer::Cpu(CpuRenderer),
         };
         let left = args.timeout.saturating_sub(start.elapsed());
