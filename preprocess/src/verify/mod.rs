@@ -4,6 +4,8 @@
 mod against;
 mod normals;
 mod spacing;
+#[cfg(test)]
+mod tests;
 mod tree;
 
 use std::{
@@ -15,7 +17,7 @@ use std::{
     },
 };
 
-use lodestream_protocol::{Dataset, Manifest, NodeKey, NodePoints, ReadAt, Refinement};
+use lodestream_protocol::{Dataset, LatticeBox, Manifest, NodeKey, NodePoints, ReadAt, Refinement};
 use normals::Cones;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -142,6 +144,7 @@ pub fn verify(config: &VerifyConfig, progress: &dyn Progress) -> Result<VerifyRe
     progress.phase("decode", manifest.points, "points");
     let groups: Vec<usize> = (0..manifest.groups.len()).collect();
     let mut fingerprint = Fingerprint::default();
+    let mut bounds = LatticeBox::EMPTY;
     let mut points_of: HashMap<NodeKey, Vec<[u32; 3]>> = HashMap::new();
     // In batches: only the positions stay.
     for batch in nodes.chunks(64) {
@@ -161,7 +164,7 @@ pub fn verify(config: &VerifyConfig, progress: &dyn Progress) -> Result<VerifyRe
             match result {
                 Ok((points, print, off)) => {
                     off.into_iter().for_each(|line| report.find(line));
-                    tree::check_points(manifest, node, &points, &mut report);
+                    bounds.merge(&tree::check_points(manifest, node, &points, &mut report));
                     fingerprint = fingerprint.merge(print);
                     let corner = manifest.lattice.node_min(node.key);
                     let absolute =
@@ -183,6 +186,8 @@ pub fn verify(config: &VerifyConfig, progress: &dyn Progress) -> Result<VerifyRe
             "{} points in the nodes, the manifest says {}",
             fingerprint.points, manifest.points
         ));
+    } else if fingerprint.points > 0 && bounds != manifest.bounds {
+        report.find("the manifest's bounds are not those of the points".into());
     }
     if manifest.refinement == Refinement::Additive && manifest.method.name == "poisson" {
         progress.phase("spacing", manifest.points, "points");

@@ -60,13 +60,13 @@ pub(super) fn check_sizes(manifest: &Manifest, nodes: &[Node], report: &mut Veri
     }
 }
 
-/// Points are as many as announced, inside the bounds, in Morton order.
+/// Points are as many as announced, inside the bounds, in Morton order. Gives their own bounds.
 pub(super) fn check_points(
     manifest: &Manifest,
     node: &Node,
     points: &NodePoints,
     report: &mut VerifyReport,
-) {
+) -> LatticeBox {
     if points.positions.len() != node.points as usize {
         report.find(format!("node {}: {} points", node.key, points.positions.len()));
     }
@@ -84,4 +84,5 @@ pub(super) fn check_points(
     if !points.positions.is_sorted_by_key(code) {
         report.find(format!("node {}: points are not in Morton order", node.key));
     }
+    tight
 }
