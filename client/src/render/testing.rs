@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
+use glam::DVec3;
 use lodestream_protocol::{
     Attribute, Column, GroupInfo, Lattice, LatticeBox, Manifest, Method, NodeKey, NodePoints,
     Primitive, Refinement, ScalarType, Storage,
@@ -167,4 +168,67 @@ pub fn landscape(side_bits: u8, count: usize) -> Vec<Point> {
         points.push(Point { q, rgb, intensity });
     }
     points
+}
+
+impl TestScene {
+    /// The scene with `normal`, `axis_u`, `axis_v`, `radius` and `classification` of every point:
+    /// directions that turn with the place, ellipses three times as long as wide, a few classes.
+    pub fn with_surface(self) -> Self {
+        let float = |name: &str, components| Attribute {
+            name: name.into(),
+            scalar: ScalarType::F32,
+            components,
+            domain: Default::default(),
+            storage: Storage::Column { group: 2 },
+            min: Vec::new(),
+            max: Vec::new(),
+        };
+        let class = Attribute {
+            scalar: ScalarType::U8,
+            max: vec![18.0],
+            min: vec![0.0],
+            ..float("classification", 1)
+        };
+        let added =
+            [float("normal", 3), float("axis_u", 3), float("axis_v", 3), float("radius", 1), class];
+        let clouds = self.clouds.iter().map(|cloud| {
+            let mut cloud = Manifest::clone(cloud);
+            cloud.attributes.extend(added.clone());
+            cloud.groups.push(GroupInfo { name: "surface".into(), columns: vec![0; 5] });
+            Arc::new(cloud)
+        });
+        let clouds: Vec<_> = clouds.collect();
+        let nodes = self.nodes.into_iter().map(|node| {
+            let (lattice, first) = (&clouds[node.cloud].lattice, 2);
+            let mut columns: Vec<_> = (0..added.len())
+                .map(|i| Column { attribute: first + i, bytes: Vec::new() })
+                .collect();
+            let corner = lattice.node_min(node.key);
+            for q in &node.points.positions {
+                let place: [f64; 3] = std::array::from_fn(|a| {
+                    lattice.scale * (f64::from(corner[a]) + f64::from(q[a]))
+                });
+                let turned = DVec3::from(place) * 0.7;
+                let normal =
+                    DVec3::new(turned.x.sin(), -0.8 + 0.3 * turned.z.cos(), turned.y.cos());
+                let normal = normal.normalize();
+                let u = normal.any_orthonormal_vector();
+                let radius = 0.1 + 0.05 * turned.x.cos();
+                let axes = [u * radius, normal.cross(u) * (radius / 3.0)];
+                let vectors = [normal, axes[0], axes[1]];
+                for (column, vector) in columns.iter_mut().zip(vectors) {
+                    let bytes =
+                        vector.to_array().into_iter().flat_map(|c| (c as f32).to_le_bytes());
+                    column.bytes.extend(bytes);
+                }
+                columns[3].bytes.extend((radius as f32).to_le_bytes());
+                columns[4].bytes.push((turned.x + 10.0) as u8 % 19);
+            }
+            let mut points = NodePoints::clone(&node.points);
+            points.columns.extend(columns);
+            DrawNode { points: Arc::new(points), ..node }
+        });
+        let nodes = nodes.collect();
+        Self { clouds, nodes }
+    }
 }

@@ -145,6 +145,12 @@ impl GpuRenderer {
         Ok(submitted.statistics)
     }
 
+    /// Takes the device away, as a reset or an unplugged adapter does.
+    #[cfg(test)]
+    pub(crate) fn lose(&self) {
+        self.device.device.destroy();
+    }
+
     fn took(&mut self, frame: &Submitted) {
         // A frame that sends nodes to the GPU takes longer for it, however it is drawn.
         if let Some(kind) = frame.kind
