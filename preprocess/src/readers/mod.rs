@@ -13,6 +13,8 @@ mod names;
 pub mod ply;
 pub mod sim;
 mod slot;
+#[cfg(test)]
+pub(crate) mod testing;
 pub mod text;
 
 use lodestream_protocol::ScalarType;

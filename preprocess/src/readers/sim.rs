@@ -110,19 +110,12 @@ fn block(samples: &[Sample], station: usize, spec: &SimSpec) -> Block {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::readers::testing::Cloud;
 
     fn read(spec: &str) -> (InputInfo, Vec<[f64; 3]>, Vec<u8>) {
         let reader = open(spec).expect("a right address");
-        let info = reader.info().clone();
-        let (mut positions, mut attributes) = (Vec::new(), Vec::new());
-        let report = reader
-            .read(&mut |block| {
-                let Positions::Float(p) = block.positions else { panic!("float positions") };
-                positions.extend(p);
-                attributes.extend(block.attributes);
-                Ok(())
-            })
-            .expect("the sink takes everything");
+        let cloud = Cloud::read(reader).expect("the sink takes everything");
+        let Cloud { info, positions, attributes, report } = cloud;
         assert_eq!(Some(report.points_read), info.points);
         (info, positions, attributes)
     }

@@ -1,49 +1,21 @@
 //! Whole files: written by hand or by a small writer, read back.
 
-use std::io::Write as _;
-
 use lodestream_protocol::ScalarType;
 use proptest::prelude::*;
-use tempfile::NamedTempFile;
 
 use super::*;
-use crate::readers::{CoordinateKind, Positions};
-
-/// Everything a reader gives.
-#[derive(Debug, PartialEq)]
-struct Cloud {
-    info: InputInfo,
-    positions: Vec<[f64; 3]>,
-    attributes: Vec<u8>,
-    report: ReadReport,
-}
-
-fn file(bytes: &[u8]) -> NamedTempFile {
-    let mut file = NamedTempFile::new().expect("a temporary file");
-    file.write_all(bytes).expect("space for it");
-    file
-}
+use crate::readers::{
+    CoordinateKind,
+    testing::{Cloud, file, refusal_of},
+};
 
 fn read(bytes: &[u8]) -> Result<Cloud> {
     let file = file(bytes);
-    let reader = open(file.path())?;
-    let info = reader.info().clone();
-    let (mut positions, mut attributes) = (Vec::new(), Vec::new());
-    let report = reader.read(&mut |block| {
-        assert!(block.positions.len() <= BLOCK_POINTS);
-        let Positions::Float(block_positions) = block.positions else { panic!("not floats") };
-        positions.extend(block_positions);
-        attributes.extend(block.attributes);
-        Ok(())
-    })?;
-    Ok(Cloud { info, positions, attributes, report })
+    Cloud::read(open(file.path())?)
 }
 
 fn refusal(bytes: &[u8]) -> String {
-    match read(bytes) {
-        Err(Error::Input { message, .. }) => message,
-        other => panic!("not refused: {other:?}"),
-    }
+    refusal_of(read(bytes))
 }
 
 /// A table of numbers that can be written in every encoding.

@@ -1,42 +1,20 @@
 //! Whole files: written, then read back.
 
-use std::io::Write as _;
-
 use proptest::prelude::*;
-use tempfile::NamedTempFile;
 
 use super::*;
-use crate::readers::{InputAttribute, Positions};
-
-/// Everything a reader gives.
-#[derive(Debug, PartialEq)]
-struct Cloud {
-    info: InputInfo,
-    positions: Vec<[f64; 3]>,
-    attributes: Vec<u8>,
-    report: ReadReport,
-}
+use crate::readers::{
+    InputAttribute,
+    testing::{Cloud, file, refusal_of},
+};
 
 fn read(text: &str, columns: Option<&str>) -> Result<Cloud> {
-    let mut file = NamedTempFile::new().expect("a temporary file");
-    file.write_all(text.as_bytes()).expect("space for it");
-    let reader = open(file.path(), columns)?;
-    let info = reader.info().clone();
-    let (mut positions, mut attributes) = (Vec::new(), Vec::new());
-    let report = reader.read(&mut |block| {
-        let Positions::Float(block_positions) = block.positions else { panic!("not floats") };
-        positions.extend(block_positions);
-        attributes.extend(block.attributes);
-        Ok(())
-    })?;
-    Ok(Cloud { info, positions, attributes, report })
+    let file = file(text.as_bytes());
+    Cloud::read(open(file.path(), columns)?)
 }
 
 fn refusal(text: &str, columns: Option<&str>) -> String {
-    match read(text, columns) {
-        Err(Error::Input { message, .. }) => message,
-        other => panic!("not refused: {other:?}"),
-    }
+    refusal_of(read(text, columns))
 }
 
 /// The names of the attributes and the values of point `index`, flattened.

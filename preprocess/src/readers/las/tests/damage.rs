@@ -2,9 +2,9 @@
 
 use super::{
     Contents,
-    scan::{Compression, Scan, file},
+    scan::{Compression, Scan},
 };
-use crate::{Error, Result};
+use crate::{Error, Result, readers::testing::file};
 
 const COMPRESSIONS: [Compression; 3] =
     [Compression::None, Compression::Fixed(20), Compression::Variable];

@@ -16,6 +16,7 @@ use crate::{
             open,
             point_format::{LAST_FORMAT, Place, fields},
         },
+        testing,
     },
 };
 
@@ -81,7 +82,7 @@ fn every_version_is_read() -> Result<()> {
     }
     let mut bytes = Scan::new(8, 10, 0, Compression::None).bytes();
     bytes[25] = 5;
-    let file = super::scan::file(&bytes);
+    let file = testing::file(&bytes);
     assert_eq!(Contents::read(file.path())?.report.points_read, 10);
     Ok(())
 }
@@ -189,7 +190,7 @@ fn a_start_signature_before_the_points_of_las_1_0_is_stepped_over() -> Result<()
     // The header's position may lie before the signature or behind it.
     for position in [start, start + 2] {
         bytes[96..100].copy_from_slice(&(position as u32).to_le_bytes());
-        let contents = Contents::read(super::scan::file(&bytes).path())?;
+        let contents = Contents::read(testing::file(&bytes).path())?;
         assert_eq!(contents.positions, plain.positions);
         assert_eq!(contents.rows, plain.rows);
     }

@@ -4,7 +4,10 @@ use super::{
     Contents,
     scan::{Compression, Scan},
 };
-use crate::{Result, readers::las::extra_bytes::DESCRIPTOR_BYTES};
+use crate::{
+    Result,
+    readers::{las::extra_bytes::DESCRIPTOR_BYTES, testing::file},
+};
 
 fn descriptor(kind: u8, name: &str) -> Vec<u8> {
     let mut bytes = vec![0; DESCRIPTOR_BYTES];
@@ -85,7 +88,7 @@ fn a_count_of_records_that_lies_is_not_believed() -> Result<()> {
         scan.records.push(("LASF_Projection", 2112, b"LOCAL_CS[\"here\"]".to_vec()));
         let mut bytes = scan.bytes();
         bytes[100..104].copy_from_slice(&u32::MAX.to_le_bytes());
-        let contents = Contents::read(super::scan::file(&bytes).path())?;
+        let contents = Contents::read(file(&bytes).path())?;
         assert_eq!(contents.info.crs.as_deref(), Some("LOCAL_CS[\"here\"]"));
         assert_eq!(contents.positions.len(), 5);
         assert!(contents.says("4294967295 variable length records"));
@@ -101,7 +104,7 @@ fn a_record_that_reaches_into_the_points_ends_the_walk() -> Result<()> {
     let mut bytes = scan.bytes();
     let length = usize::from(scan.header.header_size) + 20;
     bytes[length..length + 2].copy_from_slice(&u16::MAX.to_le_bytes());
-    let contents = Contents::read(super::scan::file(&bytes).path())?;
+    let contents = Contents::read(file(&bytes).path())?;
     assert_eq!(contents.info.crs, None);
     assert_eq!(contents.positions.len(), 5);
     assert!(contents.says("2 variable length records, the file holds 0"));
@@ -117,7 +120,7 @@ fn extended_records_that_lie_are_not_believed() -> Result<()> {
     for (at, lie) in [(start + 20, u64::MAX), (start + 20, 11), (235, u64::MAX), (235, 5)] {
         let mut bytes = bytes.clone();
         bytes[at..at + 8].copy_from_slice(&lie.to_le_bytes());
-        let contents = Contents::read(super::scan::file(&bytes).path())?;
+        let contents = Contents::read(file(&bytes).path())?;
         assert_eq!(contents.positions.len(), 5);
         assert!(contents.says("extended variable length records"), "{at} {lie}");
     }

@@ -6,7 +6,7 @@ use las::{Version, raw};
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder, ParLasZipCompressor};
 use tempfile::NamedTempFile;
 
-use crate::readers::las::point_format::fields;
+use crate::readers::{las::point_format::fields, testing::file};
 
 /// How points are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -165,13 +165,6 @@ impl Scan {
     pub(crate) fn file(&self) -> NamedTempFile {
         file(&self.bytes())
     }
-}
-
-/// A file of these bytes.
-pub(crate) fn file(bytes: &[u8]) -> NamedTempFile {
-    let mut file = NamedTempFile::new().expect("a temporary file can be made");
-    file.write_all(bytes).expect("a temporary file can be written");
-    file
 }
 
 fn vlr((user, id, data): &(&str, u16, Vec<u8>), extended: bool) -> Vec<u8> {
