@@ -86,9 +86,14 @@ impl Extent {
         (self.max - self.min).length().max(SMALLEST * largest).max(LEAST)
     }
 
-    /// Half of the sides, none thinner than a part of the size.
+    /// Half of the sides.
     pub(super) fn half(&self) -> DVec3 {
-        (0.5 * (self.max - self.min)).max(DVec3::splat(THINNEST * self.size()))
+        0.5 * (self.max - self.min)
+    }
+
+    /// Half of the sides as ways through the cloud take them: none thinner than a part of the size.
+    pub(super) fn roomy_half(&self) -> DVec3 {
+        self.half().max(DVec3::splat(THINNEST * self.size()))
     }
 
     /// Nearest that a camera may come to its target: ten times what a path's keys must keep where
@@ -115,7 +120,8 @@ impl Extent {
             let across = (c.dot(right).abs() / ASPECT).max(c.dot(up).abs());
             across / tangent - c.dot(forward)
         });
-        needed.fold(0.0, f64::max)
+        // A point would be seen from where it is.
+        needed.fold(THINNEST * self.size(), f64::max)
     }
 }
 

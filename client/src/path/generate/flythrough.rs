@@ -41,7 +41,7 @@ impl Flythrough {
     }
 
     pub fn keys(&self, common: &Common, extent: &Extent) -> Keys {
-        let half = extent.half();
+        let half = extent.roomy_half();
         // Along the longest side; up along z where that is not the longest, else along y.
         let (along, across, up) = if half.z > half.x.max(half.y) {
             (DVec3::Z, DVec3::X, DVec3::Y)

@@ -3,8 +3,7 @@
 //!
 //! Each makes key frames, so that its path can be written to a file and looked at. The same line
 //! and the same extent make the same numbers on every machine: all randomness comes from `seed`,
-//! and sines and logarithms from `libm`. A cloud that is flat, thin as a needle or a single point
-//! is walked around as if it had a twentieth of its size in the other directions, too.
+//! and sines and logarithms from `libm`. Flat clouds, needles and single points have paths, too.
 
 mod extent;
 mod flythrough;
