@@ -102,13 +102,6 @@ pub struct FrameStatistics {
     pub path: GpuPath,
 }
 
-impl FrameStatistics {
-    fn of(nodes: &[&DrawNode]) -> Self {
-        let points = nodes.iter().map(|node| node.points.positions.len() as u64).sum();
-        Self { nodes: nodes.len() as u64, points, ..Self::default() }
-    }
-}
-
 /// A picture, and what it took.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {

@@ -15,6 +15,9 @@ mod resolve;
 mod stage;
 mod truth;
 
+#[cfg(test)]
+mod tests;
+
 pub use truth::TruthRenderer;
 
 use crate::render::{DrawNode, Frame, RenderError, RenderSettings, Scene};

@@ -10,8 +10,9 @@ use crate::render::Picture;
 pub(super) fn resolve(canvas: &Canvas, stage: &Stage) -> Picture {
     let [width, height] = stage.settings.size_px;
     let pixels = width as usize * height as usize;
+    // Zeros are free until they are written, which the rows do.
     let mut picture =
-        Picture { width, height, rgba8: vec![255; 4 * pixels], depth: vec![f32::INFINITY; pixels] };
+        Picture { width, height, rgba8: vec![0; 4 * pixels], depth: vec![0.0; pixels] };
     let eye_dome = stage.settings.shading.eye_dome.as_ref();
     let shades = eye_dome.map(|e| Shades::of(canvas, e, &stage.view, stage.samples));
     let (width, samples) = (width as usize, stage.samples as usize);
@@ -25,25 +26,31 @@ pub(super) fn resolve(canvas: &Canvas, stage: &Stage) -> Picture {
         let shade = shades.shade(column, row, distance);
         (color.map(|c| (f64::from(c) * shade).round() as u8), distance)
     };
+    let pixel = |x: usize, y: usize| {
+        if samples == 1 {
+            return sample(x, y);
+        }
+        let (mut sums, mut nearest) = ([0u32; 3], f32::INFINITY);
+        for row in y * samples..(y + 1) * samples {
+            for column in x * samples..(x + 1) * samples {
+                let (rgb, distance) = sample(column, row);
+                nearest = nearest.min(distance);
+                for (sum, component) in sums.iter_mut().zip(rgb) {
+                    *sum += u32::from(component);
+                }
+            }
+        }
+        let count = stage.samples * stage.samples;
+        // Rounded to nearest; the mean of bytes is a byte.
+        (sums.map(|sum| ((sum + count / 2) / count) as u8), nearest)
+    };
     let rows = picture.rgba8.par_chunks_exact_mut(4 * width);
     rows.zip(picture.depth.par_chunks_exact_mut(width)).enumerate().for_each(
         |(y, (colors, depths))| {
-            for (x, (color, depth)) in colors.chunks_exact_mut(4).zip(depths).enumerate() {
-                let mut sums = [0u32; 3];
-                for row in y * samples..(y + 1) * samples {
-                    for column in x * samples..(x + 1) * samples {
-                        let (rgb, distance) = sample(column, row);
-                        *depth = depth.min(distance);
-                        for (sum, component) in sums.iter_mut().zip(rgb) {
-                            *sum += u32::from(component);
-                        }
-                    }
-                }
-                let count = stage.samples * stage.samples;
-                for (component, sum) in color.iter_mut().zip(sums) {
-                    // Rounded to nearest; the mean of bytes is a byte.
-                    *component = ((sum + count / 2) / count) as u8;
-                }
+            let pixels = colors.as_chunks_mut::<4>().0.iter_mut().zip(depths);
+            for (x, (rgba, depth)) in pixels.enumerate() {
+                let ([red, green, blue], distance) = pixel(x, y);
+                (*rgba, *depth) = ([red, green, blue, u8::MAX], distance);
             }
         },
     );

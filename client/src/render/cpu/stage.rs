@@ -122,6 +122,10 @@ pub(super) fn place(node: &NodeView, q: [u32; 3]) -> DVec3 {
     node.origin + node.step * DVec3::from_array(q.map(f64::from))
 }
 
+/// Points that are projected before they are drawn: while the processor waits for samples of one
+/// point, it has no projections of others to wait for too.
+const BLOCK_POINTS: usize = 64;
+
 /// A run of points of a node, about to be drawn.
 struct Strokes<'a> {
     view: &'a View,
@@ -135,12 +139,19 @@ struct Strokes<'a> {
 impl Strokes<'_> {
     fn draw<F: Footprint>(self, footprint: &F, mut take: impl FnMut(usize, Fragment)) {
         let Self { view, node, size, positions, run, grid } = self;
-        for (index, q) in run.clone().zip(&positions[run]) {
-            let place = place(&node, *q);
-            let Some(at) = view.project(place) else { continue };
-            let size_px = if F::SIZED { view.size(&at, size.world(index, *q)) } else { 1.0 };
-            let spot = Spot { index, place, at, radius_px: 0.5 * size_px };
-            footprint.cover(&spot, grid, |fragment| take(index, fragment));
+        let mut projected = [None; BLOCK_POINTS];
+        for block in run.clone().step_by(BLOCK_POINTS) {
+            let positions = &positions[block..run.end.min(block + BLOCK_POINTS)];
+            for (projected, q) in projected.iter_mut().zip(positions) {
+                let place = place(&node, *q);
+                *projected = view.project(place).map(|at| (place, at));
+            }
+            for ((projected, q), index) in projected.iter().zip(positions).zip(block..) {
+                let Some((place, at)) = *projected else { continue };
+                let size_px = if F::SIZED { view.size(&at, size.world(index, *q)) } else { 1.0 };
+                let spot = Spot { index, place, at, radius_px: 0.5 * size_px };
+                footprint.cover(&spot, grid, |fragment| take(index, fragment));
+            }
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Footprint, Fragment, Grid, Spot, wide_span};
+use super::{Footprint, Fragment, Grid, Spot, closed_span};
 use crate::render::view::View;
 
 /// Most rings of a mesh.
@@ -120,8 +120,8 @@ impl Footprint for &Mesh {
     #[inline]
     fn cover(&self, spot: &Spot, grid: Grid, mut take: impl FnMut(Fragment)) {
         let Spot { at, radius_px, .. } = *spot;
-        let columns = wide_span(at.x - radius_px, at.x + radius_px, grid.width);
-        let rows = wide_span(at.y - radius_px, at.y + radius_px, grid.height);
+        let columns = closed_span(at.x - radius_px, at.x + radius_px, grid.width);
+        let rows = closed_span(at.y - radius_px, at.y + radius_px, grid.height);
         if columns.is_empty() || rows.is_empty() {
             return;
         }

@@ -87,10 +87,14 @@ fn span(low: f64, high: f64, length: usize) -> Range<usize> {
     floor(low + 0.5).min(length)..floor(high + 0.5).min(length)
 }
 
-/// All pixels whose middles are `low` to `high`, and perhaps one that lies lower.
+/// The pixels of a row or column of `length` whose middles are at least `low` and at most `high`.
 #[inline]
-fn wide_span(low: f64, high: f64, length: usize) -> Range<usize> {
-    span(low - 1e-6, high, length)
+fn closed_span(low: f64, high: f64, length: usize) -> Range<usize> {
+    let above = low + 0.5;
+    let first = floor(above);
+    // The middle before is `low` itself.
+    let on_low = first > 0 && first as f64 == above;
+    (first - usize::from(on_low)).min(length)..floor(high + 0.5).min(length)
 }
 
 /// The whole part of a number; 0 where that is negative or NaN.
@@ -109,15 +113,23 @@ mod tests {
     fn a_span_holds_the_middles_above_its_low_end() {
         assert_eq!(span(1.5, 3.5, 9), 2..4);
         assert_eq!(span(1.4, 3.4, 9), 1..3);
-        assert_eq!(wide_span(1.5, 3.5, 9), 1..4);
         assert_eq!(span(-8.0, 80.0, 9), 0..9);
+    }
+
+    #[test]
+    fn a_closed_span_holds_the_middles_at_both_ends() {
+        assert_eq!(closed_span(1.5, 3.5, 9), 1..4);
+        assert_eq!(closed_span(1.6, 3.4, 9), 2..3);
+        assert_eq!(closed_span(0.5, 0.5, 9), 0..1);
+        assert_eq!(closed_span(-0.5, 8.5, 9), 0..9);
+        assert_eq!(closed_span(-8.0, 80.0, 9), 0..9);
     }
 
     #[test]
     fn a_span_of_what_is_no_place_is_empty() {
         for far in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300] {
             assert!(span(far - 2.0, far + 2.0, 9).is_empty(), "{far}");
-            assert!(wide_span(far - 2.0, far + 2.0, 9).is_empty(), "{far}");
+            assert!(closed_span(far - 2.0, far + 2.0, 9).is_empty(), "{far}");
         }
     }
 }

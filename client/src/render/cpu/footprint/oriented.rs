@@ -17,7 +17,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Footprint, Fragment, Grid, Spot, wide_span};
+use super::{Footprint, Fragment, Grid, Spot, closed_span};
 use crate::render::{settings::LARGEST_SPLAT_PX, surface::NodeSurface, view::View};
 
 /// The splats of a node.
@@ -127,10 +127,10 @@ impl Footprint for Oriented<'_> {
         let [lowest, highest] = tilted.extent(1);
         // Rows grow downwards.
         let [upper, lower] = reach(-highest, -lowest);
-        let columns = wide_span(at.x + left, at.x + right, grid.width);
+        let columns = closed_span(at.x + left, at.x + right, grid.width);
         let [center_column, center_row] = spot.center_pixel();
         let per_px = 1.0 / radius_px;
-        for row in wide_span(at.y + upper, at.y + lower, grid.height) {
+        for row in closed_span(at.y + upper, at.y + lower, grid.height) {
             let y = (at.y - (row as f64 + 0.5)) * per_px;
             for column in columns.clone() {
                 let x = (column as f64 + 0.5 - at.x) * per_px;
