@@ -1,5 +1,6 @@
 //! Simulated scans: see [`crate::sim`].
 
+use glam::Vec3;
 use lodestream_protocol::ScalarType;
 use rayon::prelude::*;
 
@@ -9,7 +10,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    sim::{Plan, STEPS_PER_METRE, Sample, Scanner, SimSpec},
+    sim::{Plan, STATIONS, STEPS_PER_METRE, Sample, Scanner, SimSpec},
 };
 
 /// Decimal places of the coordinates.
@@ -44,6 +45,10 @@ fn info(address: &str, spec: &SimSpec) -> InputInfo {
     }
     if spec.surfaces {
         attributes.push(attribute("surface_id", ScalarType::U16, 1));
+    }
+    if spec.axes {
+        attributes.push(attribute("axis_u", ScalarType::F32, 3));
+        attributes.push(attribute("axis_v", ScalarType::F32, 3));
     }
     InputInfo {
         path: address.into(),
@@ -103,6 +108,13 @@ fn block(samples: &[Sample], station: usize, spec: &SimSpec) -> Block {
         if spec.surfaces {
             attributes.extend_from_slice(&sample.surface.to_le_bytes());
         }
+        if spec.axes {
+            for component in
+                sample.beam_axes(&STATIONS[station]).map(|axis| axis.to_array()).as_flattened()
+            {
+                attributes.extend_from_slice(&component.to_le_bytes());
+            }
+        }
     }
     Block { positions: Positions::Float(positions), attributes }
 }
@@ -158,6 +170,27 @@ mod tests {
         let (info, _, attributes) = read("sim:courtyard?points=5&normals=0&surfaces=0");
         assert_eq!(info.attributes.len(), 4);
         assert_eq!(attributes.len(), 5 * 8);
+    }
+
+    #[test]
+    fn ellipses_lie_on_their_surface_and_reach_farther_where_it_is_turned_away() {
+        let (info, _, attributes) = read("sim:courtyard?points=20k&surfaces=0&axes=1");
+        assert_eq!(info.attributes.iter().map(|a| a.name.as_str()).last(), Some("axis_v"));
+        let row = 8 + 3 * 12;
+        let mut longest = 0.0_f32;
+        for values in attributes.chunks_exact(row) {
+            let vector = |at: usize| {
+                Vec3::from_array(std::array::from_fn(|i| {
+                    f32::from_le_bytes(values[at + 4 * i..][..4].try_into().expect("four bytes"))
+                }))
+            };
+            let [normal, u, v] = [vector(8), vector(20), vector(32)];
+            assert!(normal.dot(u).abs() < 1e-3 * u.length() && u.dot(v).abs() < 1e-3 * u.length());
+            let ratio = u.length() / v.length();
+            assert!((0.999..8.001).contains(&ratio), "{ratio}");
+            longest = longest.max(ratio);
+        }
+        assert!(longest > 4.0, "{longest}");
     }
 
     #[test]

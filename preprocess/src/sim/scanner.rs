@@ -20,6 +20,10 @@ const MAX_RANGE: f32 = 60.0;
 const WEAKEST_RETURN: f32 = 0.0035;
 /// Lowest and highest elevation of the mirror, in degrees: the tripod hides what is below.
 pub const ELEVATIONS: (f64, f64) = (-66.0, 90.0);
+/// Half the angle of the beam, in radians: 6 mm on 3 m.
+const BEAM_HALF_ANGLE: f32 = 0.002;
+/// Cosine of the incidence beyond which ellipses grow no longer.
+const FLATTEST_INCIDENCE: f32 = 0.125;
 /// How far shots stray from the grid, as a share of the angular step.
 const JITTER: f64 = 0.35;
 
@@ -74,6 +78,19 @@ pub struct Sample {
 }
 
 impl Sample {
+    /// Half axes in metres of the ellipse that the beam lit: across the beam as wide as the beam, along
+    /// the surface the longer the more the surface is turned away.
+    pub fn beam_axes(&self, station: &Station) -> [Vec3; 2] {
+        let along = self.position.as_vec3() - station.position;
+        let radius = BEAM_HALF_ANGLE * along.length();
+        let across = self.normal.cross(along);
+        // Where the surface is square to the beam any direction across it will do.
+        let across = across.try_normalize().unwrap_or_else(|| self.normal.any_orthonormal_vector());
+        let incidence = self.normal.dot(along.normalize_or_zero()).abs();
+        let away = across.cross(self.normal);
+        [away * (radius / incidence.max(FLATTEST_INCIDENCE)), across * radius]
+    }
+
     /// Coordinates rounded to the step and moved by `offset_steps`: the f64 nearest to the decimal.
     #[must_use]
     pub fn coordinates(&self, offset_steps: [i64; 3]) -> [f64; 3] {

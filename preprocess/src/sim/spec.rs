@@ -19,13 +19,15 @@ pub struct SimSpec {
     pub normals: bool,
     /// Whether points carry the id of their true surface.
     pub surfaces: bool,
+    /// Whether points carry the ellipse that the beam lit on their surface, as its half axes.
+    pub axes: bool,
     /// Added to every coordinate, in steps of which a metre has
     /// [`STEPS_PER_METRE`](super::STEPS_PER_METRE).
     pub offset_steps: [i64; 3],
 }
 
 const USAGE: &str =
-    "write sim:courtyard?points=2M&seed=1 (also: normals=0, surfaces=0, offset=X,Y,Z)";
+    "write sim:courtyard?points=2M&seed=1 (also: normals=0, surfaces=0, axes=1, offset=X,Y,Z)";
 
 impl SimSpec {
     /// Reads an address.
@@ -44,6 +46,7 @@ impl SimSpec {
             seed: 1,
             normals: true,
             surfaces: true,
+            axes: false,
             offset_steps: [0; 3],
         };
         let mut seen: Vec<&str> = Vec::new();
@@ -63,6 +66,7 @@ impl SimSpec {
                 }
                 "normals" => spec.normals = parse_switch(name, value)?,
                 "surfaces" => spec.surfaces = parse_switch(name, value)?,
+                "axes" => spec.axes = parse_switch(name, value)?,
                 "offset" => spec.offset_steps = parse_offset(value)?,
                 _ => return Err(format!("there is no parameter {name:?}; {USAGE}")),
             }
@@ -137,7 +141,7 @@ mod tests {
     #[test]
     fn reads_every_parameter() {
         let spec = SimSpec::parse(
-            "sim:courtyard?points=1.25M&seed=7&normals=0&surfaces=0&offset=500000,-5.5,0.0001",
+            "sim:courtyard?points=1.25M&seed=7&normals=0&surfaces=0&axes=1&offset=500000,-5.5,0.0001",
         )
         .expect("a right address");
         let expected = SimSpec {
@@ -145,6 +149,7 @@ mod tests {
             seed: 7,
             normals: false,
             surfaces: false,
+            axes: true,
             offset_steps: [5_000_000_000, -55_000, 1],
         };
         assert_eq!(spec, expected);
@@ -154,8 +159,8 @@ mod tests {
     fn fills_in_what_is_not_said() {
         let spec = SimSpec::parse("sim:courtyard").expect("a right address");
         assert_eq!(
-            (spec.points, spec.seed, spec.normals, spec.surfaces),
-            (2_000_000, 1, true, true)
+            (spec.points, spec.seed, spec.normals, spec.surfaces, spec.axes),
+            (2_000_000, 1, true, true, false)
         );
     }
 
