@@ -1,6 +1,5 @@
 //! Simulated scans: see [`crate::sim`].
 
-use glam::Vec3;
 use lodestream_protocol::ScalarType;
 use rayon::prelude::*;
 
@@ -121,6 +120,8 @@ fn block(samples: &[Sample], station: usize, spec: &SimSpec) -> Block {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::readers::testing::Cloud;
 

@@ -1,0 +1,143 @@
+//! Milliseconds per frame for every splat, by points drawn, on the GPU by either path and on the CPU
+//!
+//! `./dev bench frames [INPUT] [--runs N]`. INPUT is a dataset or anything that `lodestream build`
+//! takes; without one, a simulated courtyard of 12 million points. What the overview of 1280 x 720
+//! pixels needs within each budget is loaded first; then the same frame is drawn N times, ways
+//! taking turns. Times are medians from the call to the finished picture on the GPU, without reading
+//! it back. (The like of Fraiss 2017, tables 4.1, 4.2 and figures 4.1, 4.2)
+
+use std::{
+    env,
+    error::Error,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use glam::DVec3;
+use lodestream_client::{
+    camera::Camera,
+    engine::{Engine, EngineConfig, FramePlan, View},
+    render::{
+        CpuRenderer, GpuConfig, GpuPath, GpuRenderer, RenderSettings, Scene, Splat, SplatSize,
+    },
+    source::Source,
+};
+use lodestream_protocol::Manifest;
+use lodestream_tests::{Options, median, program};
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+const SIZE_PX: [u32; 2] = [1280, 720];
+
+/// Fraiss's budgets.
+const BUDGETS: [u64; 5] = [500_000, 1_000_000, 2_500_000, 5_000_000, 10_000_000];
+
+/// Splats and their sizes: each at the size at which its kind is used.
+const SPLATS: [(Splat, SplatSize); 15] = [
+    (Splat::Point, SplatSize::Pixels(1.0)),
+    (Splat::Square, SplatSize::Pixels(1.0)),
+    (Splat::Square, SplatSize::Pixels(2.0)),
+    (Splat::Square, SplatSize::Pixels(5.0)),
+    (Splat::Circle, SplatSize::Pixels(2.0)),
+    (Splat::Circle, SplatSize::Pixels(5.0)),
+    (Splat::Circle, SplatSize::Adaptive(1.6)),
+    (Splat::Cone, SplatSize::Pixels(5.0)),
+    (Splat::Paraboloid, SplatSize::Pixels(5.0)),
+    (Splat::Paraboloid8, SplatSize::Pixels(5.0)),
+    (Splat::Paraboloid16, SplatSize::Pixels(5.0)),
+    (Splat::Paraboloid48, SplatSize::Pixels(5.0)),
+    (Splat::Disc, SplatSize::Pixels(5.0)),
+    (Splat::Blended, SplatSize::Pixels(5.0)),
+    (Splat::BlendedDisc, SplatSize::Pixels(5.0)),
+];
+
+fn main() -> Result<()> {
+    let Options { input, runs } = Options::parse("sim:courtyard?points=12M&seed=1")?;
+    let dataset = if Path::new(&input).extension().is_some_and(|e| e == "lods") {
+        PathBuf::from(&input)
+    } else {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let dataset = folder.join("bench_frames.lods");
+        let mut build = Command::new(program("lodestream")?);
+        let status = build.arg("build").arg(&input).arg("-o").arg(&dataset).status()?;
+        status.success().then_some(dataset).ok_or("the build failed")?
+    };
+    let open = |path| GpuRenderer::new(GpuConfig { path, ..GpuConfig::default() });
+    let mut raster = open(GpuPath::Raster)?;
+    let mut compute = open(GpuPath::Compute)?;
+    println!("{}; {}x{} pixels; {runs} runs", raster.adapter(), SIZE_PX[0], SIZE_PX[1]);
+    for budget in BUDGETS {
+        let (clouds, plan) = load(&dataset, budget)?;
+        let scene = Scene { clouds: &clouds, nodes: &plan.nodes };
+        let camera = camera(&clouds);
+        println!("\n{} points in {} nodes\n", plan.points, plan.nodes.len());
+        println!(
+            "| splat | size | raster ms | compute ms | raster/compute | cpu ms | bytes/point |"
+        );
+        println!("| --- | --- | --- | --- | --- | --- | --- |");
+        for (splat, splat_size) in SPLATS {
+            let settings =
+                RenderSettings { splat, splat_size, ..RenderSettings::new(SIZE_PX, camera) };
+            // Uploads and compiles.
+            let first = raster.draw(&scene, &settings)?;
+            let by_compute = compute.draw(&scene, &settings)?.path == GpuPath::Compute;
+            let [mut of_raster, mut of_compute, mut of_cpu] = [const { Vec::new() }; 3];
+            for _ in 0..runs {
+                time(&mut of_raster, || raster.draw(&scene, &settings).map(drop))?;
+                if by_compute {
+                    time(&mut of_compute, || compute.draw(&scene, &settings).map(drop))?;
+                }
+                time(&mut of_cpu, || CpuRenderer.render(&scene, &settings).map(drop))?;
+            }
+            let raster_ms = median(&mut of_raster);
+            let (compute_ms, ratio) = if by_compute {
+                let ms = median(&mut of_compute);
+                (format!("{ms:.1}"), format!("{:.1}", raster_ms / ms))
+            } else {
+                ("-".into(), "-".into())
+            };
+            println!(
+                "| {} | {splat_size} | {raster_ms:.1} | {compute_ms} | {ratio} | {:.1} | {:.2} |",
+                splat.name(),
+                median(&mut of_cpu),
+                first.resident_bytes as f64 / first.points.max(1) as f64,
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Runs and notes the milliseconds.
+fn time<E>(
+    milliseconds: &mut Vec<f64>,
+    run: impl FnOnce() -> std::result::Result<(), E>,
+) -> std::result::Result<(), E> {
+    let start = Instant::now();
+    run()?;
+    milliseconds.push(start.elapsed().as_secs_f64() * 1e3);
+    Ok(())
+}
+
+fn camera(clouds: &[Arc<Manifest>]) -> Camera {
+    let bounds = clouds.iter().find_map(|cloud| cloud.bounds_world());
+    let (min, max) = bounds.unwrap_or(([0.0; 3], [1.0; 3]));
+    let aspect = f64::from(SIZE_PX[0]) / f64::from(SIZE_PX[1]);
+    Camera::overview(DVec3::from(min), DVec3::from(max), aspect)
+}
+
+/// What the overview needs within a budget.
+fn load(dataset: &Path, point_budget: u64) -> Result<(Vec<Arc<Manifest>>, Arc<FramePlan>)> {
+    let source = Source::parse(dataset.to_str().ok_or("the file's name is no text")?)?;
+    let attributes = ["color", "normal"].map(str::to_owned).to_vec();
+    // However small nodes are in the picture: the budget is what counts.
+    let config =
+        EngineConfig { point_budget, attributes, min_size_px: 0.0, ..EngineConfig::default() };
+    let engine = Engine::start(vec![source], config)?;
+    let patience = Duration::from_secs(120);
+    let boots = engine.wait_open(patience)?;
+    let clouds: Vec<_> = boots.iter().map(|boot| Arc::new(boot.manifest.clone())).collect();
+    engine.set_view(View { camera: camera(&clouds), size_px: SIZE_PX });
+    Ok((clouds, engine.wait_settled(patience)?))
+}
