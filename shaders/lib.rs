@@ -423,25 +423,30 @@ mod tests {
         Ok(module.entry_points.iter().map(|e| e.name.clone()).collect())
     }
 
-    /// Every way to draw that a renderer can ask for.
+    /// Ways to draw: every footprint with every size, normal, shape and light, colours taking turns
+    /// (parts that know of one another meet; all products would take minutes).
     fn all() -> Vec<Splatting> {
         let mut all = Vec::new();
+        let mut colors = ColorSource::ALL.into_iter().cycle();
         for footprint in Footprint::ALL {
-            for color in ColorSource::ALL {
-                for size in [SizeSource::Node, SizeSource::Adaptive, SizeSource::Record] {
-                    for normals in [false, true] {
-                        for shape in [ShapeField::None, ShapeField::Radius, ShapeField::Axes] {
-                            for phong in [false, true] {
-                                let way =
-                                    Splatting { footprint, color, size, normals, shape, phong };
-                                if color != ColorSource::Normal || way.has_normals() {
-                                    all.push(way);
-                                }
+            for size in [SizeSource::Node, SizeSource::Adaptive, SizeSource::Record] {
+                for normals in [false, true] {
+                    for shape in [ShapeField::None, ShapeField::Radius, ShapeField::Axes] {
+                        for phong in [false, true] {
+                            let color = colors.next().expect("endless");
+                            let mut way =
+                                Splatting { footprint, color, size, normals, shape, phong };
+                            if color == ColorSource::Normal && !way.has_normals() {
+                                way.color = ColorSource::Node;
                             }
+                            all.push(way);
                         }
                     }
                 }
             }
+        }
+        for color in ColorSource::ALL {
+            assert!(all.iter().any(|way| way.color == color && way.phong), "{color:?}");
         }
         all
     }

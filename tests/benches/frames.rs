@@ -82,7 +82,7 @@ fn main() -> Result<()> {
                 RenderSettings { splat, splat_size, ..RenderSettings::new(SIZE_PX, camera) };
             // Uploads and compiles.
             let first = raster.draw(&scene, &settings)?;
-            let by_compute = compute.draw(&scene, &settings)?.path == GpuPath::Compute;
+            let by_compute = compute.draw(&scene, &settings)?.path == Some(GpuPath::Compute);
             let [mut of_raster, mut of_compute, mut of_cpu] = [const { Vec::new() }; 3];
             for _ in 0..runs {
                 time(&mut of_raster, || raster.draw(&scene, &settings).map(drop))?;

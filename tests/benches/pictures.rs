@@ -36,7 +36,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 const DEFAULT_INPUT: &str = "sim:courtyard?points=4M&seed=1&axes=1";
 
 /// Of the pictures; tiles are half as wide and high.
-const SIZE_PX: [u32; 2] = [800, 500];
+const SIZE_PX: [u32; 2] = [640, 400];
 
 const BUDGET: u64 = 1_000_000;
 
@@ -69,7 +69,7 @@ fn main() -> Result<()> {
     println!("{}; {}x{} pixels", studio.raster.adapter(), SIZE_PX[0], SIZE_PX[1]);
     println!("\n| picture | raster | compute | CPU against truth | points |");
     println!("| --- | --- | --- | --- | --- |");
-    let near = studio.camera(courtyard, "door", 0.35);
+    let near = studio.camera(courtyard, "door", 0.4);
     let wide = studio.camera(courtyard, "overview", 1.0);
     let from = |camera| RenderSettings {
         background: [18, 18, 24],
@@ -77,10 +77,11 @@ fn main() -> Result<()> {
     };
     let way = |name: &str, settings| Way { name: name.to_owned(), settings };
 
-    let large = SplatSize::Adaptive(2.5);
+    // So large that shapes show.
+    let large = SplatSize::Adaptive(6.0);
     let splats = Splat::ALL
         .map(|(splat, name)| way(name, RenderSettings { splat, splat_size: large, ..from(near) }));
-    studio.sheet(&target.join("splats.png"), &splats, 4)?;
+    studio.sheet(&target.join("splats.png"), &splats, 5)?;
 
     let sizes = [
         ("2px", SplatSize::Pixels(2.0)),
@@ -107,7 +108,7 @@ fn main() -> Result<()> {
             looks.push(way(&format!("{} {name}", color.name()), settings));
         }
     }
-    studio.sheet(&target.join("looks.png"), &looks, 4)?;
+    studio.sheet(&target.join("looks.png"), &looks, 5)?;
     println!("\n{}", target.display());
     Ok(())
 }
@@ -135,8 +136,8 @@ impl Studio {
         Ok(Self { dataset: dataset.to_owned(), clouds, engine, raster, compute })
     }
 
-    /// A view of the simulated scan, or the overview of another so many times as far away.
-    fn camera(&self, courtyard: bool, name: &str, distance: f64) -> Camera {
+    /// A view of the simulated scan, or the overview of any other, with so much of its field of view.
+    fn camera(&self, courtyard: bool, name: &str, field: f64) -> Camera {
         if courtyard && let Some(view) = sim::VIEWS.iter().find(|view| view.name == name) {
             let projection = Projection::Perspective { fov_y: view.fov_y_degrees.to_radians() };
             let (eye, target) = (view.eye.into(), view.target.into());
@@ -146,7 +147,12 @@ impl Studio {
         let (min, max) = bounds.unwrap_or(([0.0; 3], [1.0; 3]));
         let aspect = f64::from(SIZE_PX[0]) / f64::from(SIZE_PX[1]);
         let overview = Camera::overview(DVec3::from(min), DVec3::from(max), aspect);
-        Camera { eye: overview.target + distance * (overview.eye - overview.target), ..overview }
+        match overview.projection {
+            Projection::Perspective { fov_y } => {
+                Camera { projection: Projection::Perspective { fov_y: field * fov_y }, ..overview }
+            }
+            Projection::Orthographic { .. } => overview,
+        }
     }
 
     /// What closes the surface on the level that most points are seen at.
@@ -170,7 +176,7 @@ impl Studio {
             let cpu = CpuRenderer.render(&scene, &way.settings)?.picture;
             let raster = self.raster.render(&scene, &way.settings)?.picture;
             let compute = self.compute.render(&scene, &way.settings)?;
-            let by_compute = if compute.statistics.path == GpuPath::Compute {
+            let by_compute = if compute.statistics.path == Some(GpuPath::Compute) {
                 format!("{:.4}", ssim(&cpu, &compute.picture)?)
             } else {
                 "-".into()

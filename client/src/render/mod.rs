@@ -98,8 +98,8 @@ pub struct FrameStatistics {
     pub resident_bytes: u64,
     /// Nodes that are not drawn yet: sending them to the GPU is left to later frames.
     pub waiting_nodes: u64,
-    /// How splats got to pixels (GPU only).
-    pub path: GpuPath,
+    /// How splats got to pixels; `None` for the CPU.
+    pub path: Option<GpuPath>,
 }
 
 /// A picture, and what it took.

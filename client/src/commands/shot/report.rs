@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::{
     engine::{EngineStats, LeftOut},
-    render::FrameStatistics,
+    render::{FrameStatistics, PointsPerPixel},
 };
 
 /// The `--report` of `shot`.
@@ -48,6 +48,8 @@ pub struct ShotReport {
     pub frame: FrameStatistics,
     /// Structural similarity to the picture of `--against`.
     pub ssim: Option<f64>,
+    /// How many points fall on the pixels, for `--color density`.
+    pub points_per_pixel: Option<PointsPerPixel>,
     /// What failed for good: the picture lacks it.
     pub problems: Vec<String>,
 }
@@ -71,6 +73,12 @@ impl ShotReport {
         if let Some(ssim) = self.ssim {
             // A write to a string does not fail.
             let _ = write!(line, ", SSIM {ssim:.4}");
+        }
+        if let Some(PointsPerPixel { most_frequent, mean, largest, .. }) = self.points_per_pixel {
+            let _ = write!(
+                line,
+                ", points per pixel: most often {most_frequent}, {mean:.1} on average, at most {largest}"
+            );
         }
         line + "\n"
     }

@@ -27,8 +27,8 @@ pub(super) struct Stream {
     pub clouds: Vec<Arc<Manifest>>,
     /// How each cloud is coloured.
     pub colorings: Vec<Coloring>,
-    /// Why the GPU does not draw, where it was asked to.
-    pub fallback: Option<String>,
+    /// What the GPU failed of, if it did.
+    fallback: Option<String>,
     renderer: Renderer,
 }
 
@@ -97,6 +97,13 @@ impl Stream {
         self.renderer.name()
     }
 
+    /// Why the GPU does not draw, where it was asked to.
+    pub fn fallback(&self) -> Option<String> {
+        // A GPU that was opened anew draws again.
+        let on_cpu = matches!(self.renderer, Renderer::Cpu(_));
+        self.fallback.clone().filter(|_| on_cpu)
+    }
+
     /// As a report names the colours.
     pub fn color_names(&self) -> Vec<&'static str> {
         self.colorings.iter().map(Coloring::name).collect()
@@ -104,7 +111,11 @@ impl Stream {
 }
 
 fn tell(e: &RenderError, fallback: &mut Option<String>) {
-    eprintln!("note: {e}; drawing on the CPU");
+    let then = match e {
+        RenderError::Gpu(_) => "opening it anew, or drawing on the CPU",
+        _ => "drawing on the CPU",
+    };
+    eprintln!("note: {e}; {then}");
     *fallback = Some(e.to_string());
 }
 
@@ -138,7 +149,7 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
         size_px: args.size,
         camera: serde_json::from_str(&settings.camera.to_json())?,
         renderer: stream.renderer_name(),
-        fallback: stream.fallback.clone(),
+        fallback: stream.fallback(),
         colors: stream.color_names(),
         points: frame.statistics.points,
         nodes: frame.statistics.nodes,
@@ -152,6 +163,7 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
         engine: Some(stats),
         frame: frame.statistics,
         ssim: None,
+        points_per_pixel: frame.points_per_pixel,
     };
     Ok(Shot { picture: frame.picture, report })
 }

@@ -116,7 +116,7 @@ impl Drawer {
 
     fn fallback(&self) -> Option<String> {
         match self {
-            Self::Stream(stream) => stream.fallback.clone(),
+            Self::Stream(stream) => stream.fallback(),
             Self::Truth(_) => None,
         }
     }

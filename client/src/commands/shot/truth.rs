@@ -122,7 +122,7 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
     let truth = Truth::open(args)?;
     let settings = args.settings(camera, &truth.clouds)?;
     // Nothing is lost where an interrupt simply ends the program.
-    let Frame { picture, statistics, .. } =
+    let Frame { picture, statistics, points_per_pixel } =
         truth.draw(args, &settings, "draw", &AtomicBool::new(false))?;
     let milliseconds = start.elapsed().as_secs_f64() * 1e3;
     let (requests, bytes) = truth.read_so_far();
@@ -145,6 +145,7 @@ pub(super) fn draw(args: &ShotArgs, camera: Option<Camera>) -> anyhow::Result<Sh
         engine: None,
         frame: statistics,
         ssim: None,
+        points_per_pixel,
         problems: Vec::new(),
     };
     Ok(Shot { picture, report })

@@ -39,6 +39,10 @@ use crate::render::{
     ramp::Ramp, scene::Surroundings, view::View,
 };
 
+/// Splats that may be larger are not tried by compute, unless asked for: one invocation draws all
+/// pixels of a splat, and adapters are reset that work on one thing for too long.
+const MOST_COMPUTED_PX: f64 = 64.0;
+
 /// Draws with wgpu, into memory.
 pub struct GpuRenderer {
     device: Device,
@@ -156,7 +160,7 @@ impl GpuRenderer {
         if let Some(kind) = frame.kind
             && frame.statistics.uploaded_bytes == 0
         {
-            let by_compute = frame.statistics.path == GpuPath::Compute;
+            let by_compute = frame.statistics.path == Some(GpuPath::Compute);
             self.choice.took(kind, by_compute, frame.since.elapsed());
         }
     }
@@ -200,7 +204,8 @@ impl GpuRenderer {
         }
         let footprint = settings.splat.footprint();
         let computable = fits && !settings.splat.is_blended() && !footprint.is_mesh();
-        let kind = (computable && !counted && self.path == GpuPath::Auto)
+        let sensible = computable && plan.largest_px <= MOST_COMPUTED_PX;
+        let kind = (sensible && !counted && self.path == GpuPath::Auto)
             .then(|| Kind::new(footprint, plan.points, pixels));
         let by_compute = counted
             || match (kind, self.path) {
@@ -247,7 +252,7 @@ impl GpuRenderer {
             uploaded_bytes,
             resident_bytes,
             waiting_nodes: plan.waiting_nodes,
-            path: if by_compute { GpuPath::Compute } else { GpuPath::Raster },
+            path: Some(if by_compute { GpuPath::Compute } else { GpuPath::Raster }),
         };
         Ok(Submitted { statistics, view, lit: dome.is_some(), kind, since })
     }

@@ -1,6 +1,7 @@
 //! What a frame draws, in drawing order: one record per node, one per chunk, and runs of chunks that
 //! are drawn with one call each.
 
+use glam::Vec3;
 use lodestream_shaders::{CHUNK_POINTS, ColorSource, ShapeField, SizeSource, Splatting};
 
 use super::{
@@ -39,6 +40,8 @@ pub struct Plan {
     pub waiting_nodes: u64,
     /// Points in the nodes that are drawn.
     pub points: u64,
+    /// About the size of the largest splat.
+    pub largest_px: f64,
 }
 
 /// What all nodes of a frame share.
@@ -57,6 +60,21 @@ impl Frame<'_> {
             SplatSize::Adaptive(factor) => factor,
             _ => CLOSED_SURFACE,
         }
+    }
+
+    /// About the size of the largest splat of a node, of whose points none is nearer than its anchor.
+    fn largest_px(&self, node: &NodeUniform, spacing: f32) -> f64 {
+        let world = match self.settings.splat_size {
+            SplatSize::Pixels(_) => 0.0,
+            SplatSize::World(size) => size,
+            SplatSize::Level(factor) | SplatSize::Adaptive(factor) => factor * f64::from(spacing),
+            SplatSize::Own if node.shape_unit > 0.0 => 2.0 * f64::from(node.shape_unit),
+            SplatSize::Own => CLOSED_SURFACE * f64::from(spacing),
+        };
+        let distance = f64::from(Vec3::from(node.anchor_view).length()).max(self.view.near);
+        let w = if self.view.perspective { distance } else { 1.0 };
+        let px = self.view.size_px + world * self.view.px_per_world / w;
+        px.clamp(self.view.smallest_size_px, self.view.largest_size_px)
     }
 
     /// How the nodes of a cloud are drawn whose colours are `colors`.
@@ -138,6 +156,7 @@ impl Plan {
             color: packed_color(crate::render::color::NEUTRAL),
             ..place
         };
+        self.largest_px = self.largest_px.max(frame.largest_px(&uniform, node.spacing));
         match colors {
             NodeColor::Constant(color) => uniform.color = packed_color(color),
             NodeColor::Elevation { at_corner, per_unit } => {

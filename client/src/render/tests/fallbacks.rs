@@ -94,10 +94,10 @@ fn a_picture_that_the_compute_path_cannot_hold_is_rasterised() {
     let (scene, settings) = one_point();
     // 8 bytes a pixel are more than the 128 MiB that every adapter binds.
     let large = RenderSettings { size_px: [8192, 4096], ..settings };
-    assert_eq!(gpu.draw(&scene.scene(), &large).expect("drawn").path, GpuPath::Raster);
+    assert_eq!(gpu.draw(&scene.scene(), &large).expect("drawn").path, Some(GpuPath::Raster));
     let counted = RenderSettings { color: ColorMode::Density, ..large };
     let refused = gpu.draw(&scene.scene(), &counted).expect_err("refused").to_string();
     assert!(refused.contains("smaller picture"), "{refused}");
     let small = RenderSettings { size_px: [64, 64], ..settings };
-    assert_eq!(gpu.draw(&scene.scene(), &small).expect("drawn").path, GpuPath::Compute);
+    assert_eq!(gpu.draw(&scene.scene(), &small).expect("drawn").path, Some(GpuPath::Compute));
 }
