@@ -76,8 +76,11 @@ fn assert_by_rays(found: &Picture, ellipse: &Ellipse, is_perspective: bool, what
             _ if center_px == [f64::from(column), f64::from(row)] => center.z,
             _ => f64::INFINITY,
         };
-        let same = found == expected || (found - expected).abs() <= 1e-6 * expected;
-        assert!(same, "{what}: {found}, expected {expected}");
+        assert_eq!(found.is_finite(), expected.is_finite(), "{what}");
+        if expected.is_finite() {
+            let difference = (found - expected).abs();
+            assert!(difference <= 1e-6 * expected, "{what}: {found}, expected {expected}");
+        }
     }
     drawn
 }
@@ -195,9 +198,10 @@ fn ellipses_are_where_the_rays_meet_them() {
 
 #[test]
 fn a_disc_through_the_eye_is_drawn_as_far_as_it_is_in_front() {
-    // It reaches 30 units around a centre 3 units away: to the eye's sides and behind it.
-    let (center, size) = (DVec3::new(0.5, -1.0, 3.0), 610.0);
-    for normal in [[0.25, 1.0, 0.0], [1.0, 0.5, 0.25], [-0.5, 1.0, -0.5]].map(DVec3::from) {
+    // It reaches 3.5 to 30 units around a centre 3 units away: to the eye's sides and behind it.
+    let center = DVec3::new(0.5, -1.0, 3.0);
+    let normals = [[0.25, 1.0, 0.0], [1.0, 0.5, 0.25], [-0.5, 1.0, -0.25]].map(DVec3::from);
+    for (normal, size) in normals.into_iter().flat_map(|n| [(n, 72.0), (n, 120.0), (n, 610.0)]) {
         let axes = normal.normalize().any_orthonormal_pair().into();
         let disc = Ellipse::of(center, axes, 0.5 * f64::from(size), true);
         let reach = (disc.axes[0].z.powi(2) + disc.axes[1].z.powi(2)).sqrt();
@@ -205,7 +209,7 @@ fn a_disc_through_the_eye_is_drawn_as_far_as_it_is_in_front() {
         let surfel = surfel(center, normal, [DVec3::ZERO; 2]);
         let found = draw(&[surfel], &["normal"], &settings(Splat::Disc, size, true));
         let drawn = assert_by_rays(&found, &disc, true, &normal.to_string());
-        assert!(drawn > 300, "{drawn}");
+        assert!(drawn > 100, "{drawn}");
     }
 }
 

@@ -87,3 +87,21 @@ fn blended_truth_is_the_blended_picture_better_sampled() {
     let similarity = crate::render::ssim(&sampled, &picture).expect("same size");
     assert!(similarity > 0.85 && similarity < 1.0, "{similarity}");
 }
+
+#[test]
+fn a_pixel_is_as_far_as_its_nearest_sample() {
+    // A fifth of a pixel from the left and from the right edge of the same one.
+    for nearer in [-0.3, 0.3] {
+        let surfels = [Surfel::at(nearer, 0.0, 10.0), Surfel::at(-nearer, 0.0, 12.0)];
+        let scene = scene(&surfels, &[]);
+        let mut truth = truth(&scene, &with(Splat::Point, 1.0, orthographic([5, 5])), 4);
+        add_all(&mut truth, &scene);
+        let picture = truth.finish().expect("complete").picture;
+        assert_eq!(depth_at(&picture, 2, 2), 10.0);
+        let beside = if nearer < 0.0 { 3 } else { 1 };
+        assert_eq!(
+            [depth_at(&picture, beside, 2), depth_at(&picture, 4 - beside, 2)],
+            [12.0, 10.0]
+        );
+    }
+}
