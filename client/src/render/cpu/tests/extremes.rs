@@ -204,8 +204,17 @@ fn any_settings() -> impl Strategy<Value = RenderSettings> {
             .prop_map(|less| Projection::Perspective { fov_y: std::f64::consts::PI - less }),
         (-200.0..200.0_f64).prop_map(|e| Projection::Orthographic { height: e.exp2() }),
     ];
-    let camera = (vector(), vector(), vector(), projection)
-        .prop_map(|(eye, to, up, projection)| Camera { eye, target: eye + to, up, projection });
+    // Anywhere and to anywhere; and more often to the points, from among them or not.
+    let inside = [-40.0..40.0, -40.0..40.0, -40.0..40.0_f64].prop_map(DVec3::from);
+    let anywhere = (vector(), vector()).prop_map(|(eye, to)| (eye, eye + to));
+    let from_inside = (inside.clone(), inside.clone());
+    let sight = prop_oneof![anywhere, (vector(), inside), from_inside];
+    let camera = (sight, vector(), projection).prop_map(|((eye, target), up, projection)| Camera {
+        eye,
+        target,
+        up,
+        projection,
+    });
     let size = prop_oneof![
         (-3.0..11.0_f32).prop_map(|e| SplatSize::Pixels(e.exp2())),
         (-100.0..100.0_f64).prop_map(|e| SplatSize::World(e.exp2())),
