@@ -28,32 +28,13 @@ fn rasterise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     }
     let chunk = chunks[chunk_index];
     let node = nodes[chunk.node];
-    let size = 2.0 * camera.half_size_px;
-    let width = u32(size.x);
     for (var index = local; index < chunk.points; index += INVOCATIONS) {
         let surfel = surfel_at(chunk, node, index);
         if !surfel.visible {
             continue;
         }
         let shape = shape_of_surfel(node, surfel);
-        let box = box_of(shape);
-        // The pixels whose middles lie in the box; written so that a box that is none has no pixels.
-        let low = max(floor(box.xy), vec2(0.0));
-        let high = min(ceil(box.zw), size);
-        if !all(low < high) {
-            continue;
-        }
-        let first = vec2<u32>(low);
-        let end = vec2<u32>(high);
         // Owners count down, so that of equal depths the first drawn is the greatest.
-        let owner = 0xffffffffu - (chunk_index * CHUNK_POINTS + index);
-        for (var y = first.y; y < end.y; y++) {
-            for (var x = first.x; x < end.x; x++) {
-                let hit = hit(shape, vec2(f32(x), f32(y)) + 0.5);
-                if hit.covered {
-                    offer(y * width + x, hit.depth, owner);
-                }
-            }
-        }
+        cover(shape, 0xffffffffu - (chunk_index * CHUNK_POINTS + index));
     }
 }

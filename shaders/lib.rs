@@ -354,13 +354,20 @@ impl Splatting {
             Pixels::Wide => include_str!("offer64.wgsl"),
             Pixels::Narrow => include_str!("offer32.wgsl"),
         };
-        self.shapes(light) + include_str!("compute.wgsl") + offer
+        self.shapes(light) + self.cover() + include_str!("compute.wgsl") + offer
     }
 
     /// The WGSL that counts the points of every pixel. Entry point: `rasterise`.
     #[must_use]
     pub fn count(&self, light: &Phong) -> String {
-        self.shapes(light) + &parts!("compute", "offer_count")
+        self.shapes(light) + self.cover() + &parts!("compute", "offer_count")
+    }
+
+    const fn cover(&self) -> &'static str {
+        match self.footprint {
+            Footprint::Point => include_str!("cover_point.wgsl"),
+            _ => include_str!("cover_box.wgsl"),
+        }
     }
 
     /// The WGSL that colours what [`compute`](Self::compute) found. Entry points: `full`,
@@ -427,13 +434,15 @@ mod tests {
     /// (parts that know of one another meet; all products would take minutes).
     fn all() -> Vec<Splatting> {
         let mut all = Vec::new();
-        let mut colors = ColorSource::ALL.into_iter().cycle();
+        let mut turn = 0;
         for footprint in Footprint::ALL {
             for size in [SizeSource::Node, SizeSource::Adaptive, SizeSource::Record] {
                 for normals in [false, true] {
                     for shape in [ShapeField::None, ShapeField::Radius, ShapeField::Axes] {
+                        // Another one for the same normals and shape the next time.
+                        let color = ColorSource::ALL[(turn + turn / 6) % 6];
+                        turn += 1;
                         for phong in [false, true] {
-                            let color = colors.next().expect("endless");
                             let mut way =
                                 Splatting { footprint, color, size, normals, shape, phong };
                             if color == ColorSource::Normal && !way.has_normals() {
