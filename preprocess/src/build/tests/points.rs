@@ -99,3 +99,18 @@ fn parents_whose_children_gave_all_points_away_are_leaves() {
     }
     assert!(verified(&config, &config.inputs).is_sound());
 }
+
+#[test]
+fn a_tree_of_more_nodes_than_a_page_holds_is_read_whole() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let height = |i: i64| i * 7919 % 89;
+    let points: Vec<[i64; 3]> =
+        (0..80_000).map(|i| [i % 283 * 9, i / 283 * 9, height(i)]).collect();
+    let config = config(folder.path(), &points, 2, 1 << 30);
+    let (report, dataset) = built(&config);
+    let pages = dataset.boot().root_page.nodes.iter().filter(|n| n.child_page.is_some()).count();
+    assert!(report.nodes > 4096 && pages > 0, "{} nodes, {pages} pages", report.nodes);
+    let verified = verified(&config, &config.inputs);
+    assert!(verified.is_sound(), "{:?}", verified.findings);
+    assert_eq!(verified.nodes, report.nodes);
+}
