@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn ellipses_lie_on_their_surface_and_reach_farther_where_it_is_turned_away() {
         let (info, _, attributes) = read("sim:courtyard?points=20k&surfaces=0&axes=1");
-        assert_eq!(info.attributes.iter().map(|a| a.name.as_str()).last(), Some("axis_v"));
+        assert_eq!(info.attributes.last().map(|a| a.name.as_str()), Some("axis_v"));
         let row = 8 + 3 * 12;
         let mut longest = 0.0_f32;
         for values in attributes.chunks_exact(row) {

@@ -46,7 +46,7 @@ impl Choice {
             [None, _] => false,
             [Some(raster), Some(compute)] => {
                 let faster = compute <= raster;
-                if times.frames % LOOK_AGAIN == 0 { !faster } else { faster }
+                if times.frames.is_multiple_of(LOOK_AGAIN) { !faster } else { faster }
             }
         }
     }

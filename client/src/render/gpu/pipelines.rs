@@ -1,6 +1,6 @@
 //! Pipelines, made when they are first needed: nothing is compiled that no view asks for.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, hash_map::Entry};
 
 use lodestream_shaders::{Blending, Footprint, Mesh, Phong, Pixels, Splatting};
 
@@ -203,11 +203,10 @@ impl Pipelines {
 
     /// The indices of a footprint that is drawn with indices, made if they are not there yet.
     pub fn indices(&mut self, device: &wgpu::Device, footprint: Footprint) -> Option<&Indices> {
-        if !self.indices.contains_key(&footprint) {
-            let made = make_indices(device, footprint)?;
-            self.indices.insert(footprint, made);
+        match self.indices.entry(footprint) {
+            Entry::Occupied(there) => Some(there.into_mut()),
+            Entry::Vacant(none) => Some(none.insert(make_indices(device, footprint)?)),
         }
-        self.indices.get(&footprint)
     }
 
     fn make_computing(&self, device: &wgpu::Device, key: Computing) -> wgpu::ComputePipeline {
