@@ -6,6 +6,9 @@
 // offsets there, and s, t how fast their distance grows (per distance of the centre; 0 in an
 // orthographic view): a (U - d s) + b (V - d t) = d.
 
+// No part of it is farther from its centre on the picture.
+const LARGEST_SPLAT_PX = 1024.0;
+
 struct Shape {
     center_px: vec2<f32>,
     // U, then V.
@@ -38,7 +41,7 @@ fn extent(offsets: vec2<f32>, slopes: vec2<f32>) -> vec2<f32> {
     // Where it reaches behind the eye there is no end to it but the largest splat's.
     let found = select(vec2(-1e9, 1e9), vec2(p + root, p - root) / q, q < -1e-4);
     // The pixel that holds the centre too.
-    let reach = camera.largest_size_px;
+    let reach = LARGEST_SPLAT_PX;
     return vec2(clamp(found.x, -reach, -0.5), clamp(found.y, 0.5, reach));
 }
 

@@ -15,5 +15,7 @@ fn fragment(in: Varyings) -> Fragment {
     }
     let weight = exp(-3.0 * hit.r_squared);
     let distance = max(camera.near / hit.depth - world_radius(in), camera.near);
-    return Fragment(vec4(in.color.rgb * weight, weight), camera.near / distance);
+    // However small the radius: the nearest splat itself passes.
+    let depth = max(camera.near / distance, hit.depth);
+    return Fragment(vec4(in.color.rgb * weight, weight), depth);
 }

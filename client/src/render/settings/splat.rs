@@ -29,7 +29,7 @@ pub enum Splat {
     Cone,
     /// A circle whose parts are at `z + r² R`. (Fraiss 2017, listing 3.6)
     Paraboloid,
-    /// The paraboloid as 8 triangles. (Fraiss 2017, 3.3.4)
+    /// The paraboloid as 8 triangles, at least 1.54 pixels across. (Fraiss 2017, 3.3.4)
     Paraboloid8,
     /// The paraboloid as 16 triangles.
     Paraboloid16,

@@ -16,6 +16,10 @@ const MOST_RINGS: usize = 3;
 /// between two triangles by rounding.
 const ON_EDGE: f64 = 1e-9;
 
+/// A mesh is drawn at least so large: a polygon of eight sides then holds every place within 0.7072
+/// pixels, and so the middle of the pixel that holds its centre.
+const SMALLEST_RADIUS_PX: f64 = 0.766;
+
 /// A triangle in units of the radius, x right, y down.
 #[derive(Debug, Clone, Copy)]
 struct Triangle {
@@ -119,7 +123,8 @@ impl Mesh {
 impl Footprint for &Mesh {
     #[inline]
     fn cover(&self, spot: &Spot, grid: Grid, mut take: impl FnMut(Fragment)) {
-        let Spot { at, radius_px, .. } = *spot;
+        let at = spot.at;
+        let radius_px = spot.radius_px.max(SMALLEST_RADIUS_PX);
         let columns = closed_span(at.x - radius_px, at.x + radius_px, grid.width);
         let rows = closed_span(at.y - radius_px, at.y + radius_px, grid.height);
         if columns.is_empty() || rows.is_empty() {
