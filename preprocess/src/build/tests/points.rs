@@ -68,16 +68,21 @@ fn points_beyond_memory_go_through_the_disk_to_the_same_bytes() {
 }
 
 #[test]
-fn a_value_that_changes_between_blocks_is_no_constant() {
-    // Within each block that was read, and each thread's share of them, it is the same.
+fn a_value_that_changes_between_files_is_no_constant() {
+    // Each file is one block of the store, and each thread looks at one of them.
     let folder = tempfile::tempdir().expect("temporary folder");
     let mut config = config(folder.path(), &[], 2, 1 << 30);
-    let line = |i: u32| format!("{} {} 0 {}\n", i % 400, i / 400, i / 65_536);
-    let text: String = (0..3 * 65_536).map(line).collect();
-    write(folder.path(), "cloud.xyz", text.as_bytes());
-    config.columns = Some("x,y,z,part".into());
+    let points: Vec<[i32; 3]> = (0..65_536).map(|i| [i % 256, i / 256, 0]).collect();
+    config.inputs = (0..2u8)
+        .map(|value| {
+            let mut scan = scan(&points, 0.01, 0);
+            scan.points.chunks_exact_mut(20).for_each(|record| record[12] = value);
+            write(folder.path(), &format!("{value}.las"), &scan.bytes())
+        })
+        .collect();
     let (_, dataset) = built(&config);
-    assert!(dataset.manifest().attribute("part").is_some_and(|a| a.constant().is_none()));
+    let intensity = dataset.manifest().attribute("intensity").expect("in every LAS file");
+    assert!(intensity.constant().is_none());
     assert!(verified(&config, &config.inputs).is_sound());
 }
 

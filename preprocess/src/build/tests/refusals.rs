@@ -28,6 +28,8 @@ fn what_no_disk_has_room_for_is_refused_before_it_is_read() {
     let mut config = config(folder.path(), &[], 1, 1 << 30);
     config.inputs = vec!["sim:courtyard?points=1000G".into()];
     config.columns = None;
+    // Should it not be refused, it must not begin either.
+    config.cancel.store(true, Ordering::Relaxed);
     let error = build(&config, &Quiet).expect_err("refused").to_string();
     assert!(error.contains("the build needs about") && error.contains("raise --memory"), "{error}");
     // All that memory can hold: nothing goes to the disk but the dataset.
