@@ -104,9 +104,18 @@ fn spacings_are_those_of_the_levels_and_less_in_full_leaves() {
             assert_eq!((node.spacing, node.geometric_error), (level, level), "{node:?}");
         }
     }
-    // Two points at opposite corners are farther apart, on the mean, than their level demands.
-    let corners = [[0; 3], [(1 << 20) - 1; 3]];
-    let (_, dataset) = built(&config(folder.path(), &corners, 2, 1 << 30));
-    let root = &dataset.hierarchy().expect("nodes")[0];
-    assert_eq!(root.spacing, dataset.manifest().spacing_world(0) as f32);
+    // Few points at opposite corners are farther apart, on the mean, than their level demands: in a
+    // leaf that is the root, and in one below a crowd (the last of the three keeps it from giving all
+    // its points away).
+    let corners = [[1 << 19; 3], [(1 << 20) - 1; 3], [(1 << 19) + 1; 3]];
+    let crowd = (0..200).map(|i| [i % 10, i / 10, 0]);
+    for points in [corners.to_vec(), crowd.chain(corners).collect()] {
+        let (_, dataset) = built(&config(folder.path(), &points, 2, 1 << 30));
+        let nodes = dataset.hierarchy().expect("nodes");
+        let corner = dataset.manifest().bounds.max;
+        let far = nodes.iter().find(|node| node.is_leaf() && node.bounds.contains(corner));
+        let far = far.expect("it keeps a point");
+        let level = dataset.manifest().spacing_world(far.key.level()) as f32;
+        assert!(far.spacing == level && level > 1000.0, "{far:?}");
+    }
 }
