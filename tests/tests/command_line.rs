@@ -113,6 +113,44 @@ fn what_is_built_is_sound_and_comes_back_from_las_laz_and_ply() {
     }
 }
 
+/// What `inspect` tells of a dataset built of an exported file.
+fn described(dataset: &str) -> serde_json::Value {
+    serde_json::from_str(&succeeds(&["inspect", dataset, "--json"])).expect("JSON")
+}
+
+#[test]
+fn upper_levels_and_boxes_are_exported_to_the_point() {
+    let folder = Folder::new();
+    let [dataset, part, again] = ["a.lods", "part.las", "again.lods"].map(|n| folder.path(n));
+    succeeds(&["build", SCAN, "-o", &dataset, "--grid", "32"]);
+    let whole = described(&dataset);
+    let exported = |option: &str, value: &str| {
+        succeeds(&["export", &dataset, "-o", &part, option, value]);
+        succeeds(&["build", &part, "-o", &again]);
+        described(&again)["points"].as_u64().expect("a number")
+    };
+    let levels = whole["levels"].as_array().expect("a list");
+    assert!(levels.len() > 2, "{levels:?}");
+    let mut points = 0;
+    for (number, level) in levels.iter().enumerate() {
+        points += level["points"].as_u64().expect("a number");
+        assert_eq!(exported("--level", &number.to_string()), points, "level {number}");
+    }
+    // Two boxes that share a face between two steps of the lattice have every point once.
+    let step = whole["lattice"]["scale"].as_f64().expect("a number");
+    let bounds = |corner: &str| -> Vec<f64> {
+        let numbers = whole["bounds"][corner].as_array().expect("three numbers").iter();
+        numbers.map(|n| n.as_f64().expect("a number")).collect()
+    };
+    let (min, max) = (bounds("min"), bounds("max"));
+    let face = ((min[0] + max[0]) / 2.0 / step).floor() * step + step / 2.0;
+    let left = format!("{},{},{},{face},{},{}", min[0] - 1.0, min[1], min[2], max[1], max[2]);
+    let right = format!("{face},{},{},{},{},{}", min[1], min[2], max[0] + 1.0, max[1], max[2]);
+    let halves = [left, right].map(|bounds| exported("--bounds", &bounds));
+    assert!(halves.iter().all(|&points| points > 1000), "{halves:?}");
+    assert_eq!(halves[0] + halves[1], 30_000);
+}
+
 #[test]
 fn real_scans_are_built_and_verified_against_their_files() {
     let folder = Folder::new();
