@@ -6,30 +6,19 @@
 //! taking turns. Times are medians from the call to the finished picture on the GPU, without reading
 //! it back. (The like of Fraiss 2017, tables 4.1, 4.2 and figures 4.1, 4.2)
 
-use std::{
-    env,
-    error::Error,
-    path::{Path, PathBuf},
-    process::Command,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{error::Error, time::Instant};
 
-use glam::DVec3;
-use lodestream_client::{
-    camera::Camera,
-    engine::{Engine, EngineConfig, FramePlan, View},
-    render::{
-        CpuRenderer, GpuConfig, GpuPath, GpuRenderer, RenderSettings, Scene, Splat, SplatSize,
-    },
-    source::Source,
+use lodestream_client::render::{
+    CpuRenderer, GpuConfig, GpuPath, GpuRenderer, RenderSettings, Scene, Splat, SplatSize,
 };
-use lodestream_protocol::Manifest;
-use lodestream_tests::{Options, median, program};
+use lodestream_tests::{Options, median};
+
+#[path = "support/overview.rs"]
+mod overview;
+
+use overview::{SIZE_PX, camera, dataset, load};
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
-
-const SIZE_PX: [u32; 2] = [1280, 720];
 
 /// Fraiss's budgets.
 const BUDGETS: [u64; 5] = [500_000, 1_000_000, 2_500_000, 5_000_000, 10_000_000];
@@ -58,19 +47,10 @@ const SPLATS: [(Splat, SplatSize); 15] = [
 
 fn main() -> Result<()> {
     let Options { input, runs } = Options::parse("sim:courtyard?points=12M&seed=1")?;
-    let dataset = if Path::new(&input).extension().is_some_and(|e| e == "lods") {
-        PathBuf::from(&input)
-    } else {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-        let dataset = folder.join("bench_frames.lods");
-        let mut build = Command::new(program("lodestream")?);
-        let status = build.arg("build").arg(&input).arg("-o").arg(&dataset).status()?;
-        status.success().then_some(dataset).ok_or("the build failed")?
-    };
+    let dataset = dataset(&input, "bench_frames.lods")?;
     let open = |path| GpuRenderer::new(GpuConfig { path, ..GpuConfig::default() });
-    let mut raster = open(GpuPath::Raster)?;
-    let mut compute = open(GpuPath::Compute)?;
-    println!("{}; {}x{} pixels; {runs} runs", raster.adapter(), SIZE_PX[0], SIZE_PX[1]);
+    let adapter = open(GpuPath::Raster)?;
+    println!("{}; {}x{} pixels; {runs} runs", adapter.adapter(), SIZE_PX[0], SIZE_PX[1]);
     for budget in BUDGETS {
         let (clouds, plan) = load(&dataset, budget)?;
         let scene = Scene { clouds: &clouds, nodes: &plan.nodes };
@@ -87,6 +67,8 @@ fn main() -> Result<()> {
             }
             let settings =
                 RenderSettings { splat, splat_size, ..RenderSettings::new(SIZE_PX, camera) };
+            // Of their own, so that what is resident is what this way to draw needs.
+            let (mut raster, mut compute) = (open(GpuPath::Raster)?, open(GpuPath::Compute)?);
             // Uploads and compiles.
             let first = raster.draw(&scene, &settings)?;
             let by_compute = compute.draw(&scene, &settings)?.path == Some(GpuPath::Compute);
@@ -125,26 +107,4 @@ fn time<E>(
     run()?;
     milliseconds.push(start.elapsed().as_secs_f64() * 1e3);
     Ok(())
-}
-
-fn camera(clouds: &[Arc<Manifest>]) -> Camera {
-    let bounds = clouds.iter().find_map(|cloud| cloud.bounds_world());
-    let (min, max) = bounds.unwrap_or(([0.0; 3], [1.0; 3]));
-    let aspect = f64::from(SIZE_PX[0]) / f64::from(SIZE_PX[1]);
-    Camera::overview(DVec3::from(min), DVec3::from(max), aspect)
-}
-
-/// What the overview needs within a budget.
-fn load(dataset: &Path, point_budget: u64) -> Result<(Vec<Arc<Manifest>>, Arc<FramePlan>)> {
-    let source = Source::parse(dataset.to_str().ok_or("the file's name is no text")?)?;
-    let attributes = ["color", "normal"].map(str::to_owned).to_vec();
-    // However small nodes are in the picture: the budget is what counts.
-    let config =
-        EngineConfig { point_budget, attributes, min_size_px: 0.0, ..EngineConfig::default() };
-    let engine = Engine::start(vec![source], config)?;
-    let patience = Duration::from_secs(120);
-    let boots = engine.wait_open(patience)?;
-    let clouds: Vec<_> = boots.iter().map(|boot| Arc::new(boot.manifest.clone())).collect();
-    engine.set_view(View { camera: camera(&clouds), size_px: SIZE_PX });
-    Ok((clouds, engine.wait_settled(patience)?))
 }

@@ -243,15 +243,16 @@ impl<'a> NodeColor<'a> {
         colored.unwrap_or(Self::Constant(NEUTRAL))
     }
 
-    /// The colour of point `index`, which lies `z` lattice units above the node's corner.
-    pub fn color(&self, index: usize, z: u32) -> [u8; 3] {
+    /// The colour of point `index`, which lies `z()` lattice units above the node's corner.
+    #[inline]
+    pub fn color(&self, index: usize, z: impl FnOnce() -> u32) -> [u8; 3] {
         match *self {
             Self::Rgb { column, scalar, shift } => rgb_at(column, index, scalar, shift),
             Self::Intensity { .. } => Ramp::Intensity.color(self.intensity_step(index)),
             Self::Class { .. } => Ramp::Class.color(self.class(index)),
             Self::Normal(surface) => direction_color(surface.normal(index)),
             Self::Elevation { at_corner, per_unit } => {
-                Ramp::Elevation.color(Ramp::step(at_corner + per_unit * f64::from(z)))
+                Ramp::Elevation.color(Ramp::step(at_corner + per_unit * f64::from(z())))
             }
             Self::Constant(color) => color,
         }
@@ -274,6 +275,7 @@ impl<'a> NodeColor<'a> {
 }
 
 /// Colour `index` of a column; neutral where the column is too short.
+#[inline]
 fn rgb_at(column: &[u8], index: usize, scalar: ScalarType, shift: u8) -> [u8; 3] {
     let size = scalar.size_bytes();
     let start = index * 3 * size;

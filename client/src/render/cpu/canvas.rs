@@ -9,7 +9,10 @@
 //!
 //! Blended splats and counts keep distances only, and sums beside them.
 
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::{
+    Mutex, PoisonError,
+    atomic::{AtomicU32, AtomicU64, Ordering},
+};
 
 use rayon::prelude::*;
 
@@ -27,6 +30,25 @@ const EMPTY: u64 = u64::MAX;
 /// Samples that one task looks through.
 const TASK_SAMPLES: usize = 4096;
 
+/// Samples of the largest canvas whose memory is kept: 4096 x 2304.
+const MOST_SPARE_SAMPLES: usize = 4096 * 2304;
+
+/// The memory of the last canvas, for the next: getting it anew for every frame, page by page, was a
+/// quarter of a frame's time.
+static SPARE: Mutex<Option<Spare>> = Mutex::new(None);
+
+#[derive(Default)]
+struct Spare {
+    keys: Vec<AtomicU64>,
+    colors: Vec<[u8; 3]>,
+}
+
+impl Spare {
+    fn take() -> Self {
+        SPARE.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default()
+    }
+}
+
 /// What colours come from.
 enum Ink {
     /// The nearest point.
@@ -41,7 +63,7 @@ pub(super) struct Canvas {
     grid: Grid,
     keys: Vec<AtomicU64>,
     ink: Ink,
-    /// Of the samples; complete once the canvas is [dry](Self::dry).
+    /// Of the samples on which something was drawn; complete once the canvas is [dry](Self::dry).
     colors: Vec<[u8; 3]>,
 }
 
@@ -57,8 +79,14 @@ impl Canvas {
         } else {
             Ink::Nearest
         };
-        let keys = filled(samples, || AtomicU64::new(EMPTY));
-        Self { grid, keys, ink, colors: vec![[0; 3]; samples] }
+        let Spare { mut keys, mut colors } = Spare::take();
+        if keys.len() == samples {
+            keys.par_iter_mut().with_min_len(TASK_SAMPLES).for_each(|key| *key.get_mut() = EMPTY);
+        } else {
+            keys = filled(samples, || AtomicU64::new(EMPTY));
+            colors = vec![[0; 3]; samples];
+        }
+        Self { grid, keys, ink, colors }
     }
 
     /// How many times everything is drawn, [`turn`](Self::turn)ed in between.
@@ -186,6 +214,16 @@ impl Canvas {
         let row = usize::try_from(row).ok().filter(|row| *row < height)?;
         let key = self.keys[row * width + column].load(Ordering::Relaxed);
         (key != EMPTY).then(|| depth_of(key))
+    }
+}
+
+impl Drop for Canvas {
+    fn drop(&mut self) {
+        if self.keys.len() <= MOST_SPARE_SAMPLES {
+            let (keys, colors) = (std::mem::take(&mut self.keys), std::mem::take(&mut self.colors));
+            let spare = Some(Spare { keys, colors });
+            *SPARE.lock().unwrap_or_else(PoisonError::into_inner) = spare;
+        }
     }
 }
 

@@ -16,7 +16,7 @@ mod stage;
 mod truth;
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 pub use truth::TruthRenderer;
 

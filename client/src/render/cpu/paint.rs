@@ -21,9 +21,10 @@ pub(super) struct NodePaint<'a> {
 impl NodePaint<'_> {
     /// Red, green, blue of a point.
     pub fn color(&self, index: usize) -> [u8; 3] {
-        let q = self.positions[index];
-        let color = self.color.color(index, q[2]);
-        self.light.as_ref().map_or(color, |light| light.on(color, index, q))
+        // Looked up where it is needed only: points that are seen lie anywhere in memory.
+        let position = || self.positions[index];
+        let color = self.color.color(index, || position()[2]);
+        self.light.as_ref().map_or(color, |light| light.on(color, index, position()))
     }
 }
 

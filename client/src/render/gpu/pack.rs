@@ -96,7 +96,7 @@ pub fn pack(
         writer.push(q[2] - layout.min[2], z);
         match color {
             ColorSource::Rgb => {
-                let [r, g, b] = colors.color(index, q[2]);
+                let [r, g, b] = colors.color(index, || q[2]);
                 writer.push(u32::from_le_bytes([r, g, b, 0]), 24);
             }
             ColorSource::Intensity => writer.push(u32::from(colors.intensity_step(index)), 8),

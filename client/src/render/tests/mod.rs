@@ -1,5 +1,6 @@
 //! Both renderers against each other, and both against what must be seen.
 
+mod extremes;
 mod fallbacks;
 mod modes;
 mod pictures;

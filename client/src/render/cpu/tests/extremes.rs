@@ -5,10 +5,10 @@ use proptest::prelude::*;
 use super::*;
 use crate::render::{ColorMode, EyeDome, Scene, Shading, SizeLimits, testing::Random};
 
-const ALL: [&str; 4] = ["normal", "axis_u", "axis_v", "radius"];
+pub(in crate::render) const ALL: [&str; 4] = ["normal", "axis_u", "axis_v", "radius"];
 
 /// A cloud around a place, of surfels that lie in all directions.
-fn ball(center: DVec3, radius: f64, count: usize) -> Vec<Surfel> {
+pub(in crate::render) fn ball(center: DVec3, radius: f64, count: usize) -> Vec<Surfel> {
     let mut random = Random(11);
     let mut direction = || {
         let unit = [0; 3].map(|_| 2.0 * random.unit() - 1.0);
@@ -33,7 +33,7 @@ fn ball(center: DVec3, radius: f64, count: usize) -> Vec<Surfel> {
     surfels
 }
 
-fn shading() -> Shading {
+pub(in crate::render) fn shading() -> Shading {
     Shading { phong: true, eye_dome: Some(EyeDome::default()) }
 }
 
@@ -130,10 +130,9 @@ fn extreme_fields_of_view_are_drawn() {
     }
 }
 
-#[test]
-fn the_nearer_splat_is_seen_at_every_distance_of_a_scene_with_depth_ratio_ten_million() {
-    // At 0.0002, 0.002 … 2000 units, each in a direction of its own: a splat 0.1 % behind another,
-    // which is drawn after it.
+/// At 0.0002, 0.002 … 2000 units, each in a direction of its own: a red splat, and a green one 0.1 %
+/// behind it, which is drawn after it.
+pub(in crate::render) fn ladder() -> Vec<Surfel> {
     let mut surfels = Vec::new();
     for exponent in 0..8 {
         let distance = 0.0002 * 10_f64.powi(exponent);
@@ -146,11 +145,22 @@ fn the_nearer_splat_is_seen_at_every_distance_of_a_scene_with_depth_ratio_ten_mi
             surfels.push(Surfel { rgb, normal, axes, ..Surfel::at(slope * away, 0.0, away) });
         }
     }
+    surfels
+}
+
+/// The column of a picture of 161 pixels at which a pair of the ladder is seen.
+pub(in crate::render) fn column_of(exponent: i32) -> u32 {
+    (80.5 + 80.5 * (-0.7 + 0.2 * f64::from(exponent))) as u32
+}
+
+#[test]
+fn the_nearer_splat_is_seen_at_every_distance_of_a_scene_with_depth_ratio_ten_million() {
+    let surfels = ladder();
     for (splat, _) in Splat::ALL.into_iter().filter(|(splat, _)| !splat.is_blended()) {
         let settings = with(splat, 3.0, perspective([161, 161]));
         let picture = draw(&surfels, &ALL, &settings);
         for exponent in 0..8 {
-            let column = (80.5 + 80.5 * (-0.7 + 0.2 * f64::from(exponent))) as u32;
+            let column = column_of(exponent);
             assert_eq!(color_at(&picture, column, 80), [255, 0, 0], "{splat:?} {exponent}");
         }
     }

@@ -2,7 +2,7 @@
 
 mod blended;
 mod density;
-mod extremes;
+pub(in crate::render) mod extremes;
 mod facing;
 mod mesh;
 mod oriented;
@@ -31,17 +31,17 @@ const SCALE: f64 = 1.0 / (1 << 20) as f64;
 /// A point, and how its surface lies. World x is to the right, z up, y away from the eye, which is
 /// at the origin.
 #[derive(Debug, Clone, Copy)]
-struct Surfel {
-    place: DVec3,
-    rgb: [u8; 3],
-    normal: [f32; 3],
-    axes: [[f32; 3]; 2],
-    radius: f32,
+pub(in crate::render) struct Surfel {
+    pub place: DVec3,
+    pub rgb: [u8; 3],
+    pub normal: [f32; 3],
+    pub axes: [[f32; 3]; 2],
+    pub radius: f32,
 }
 
 impl Surfel {
     /// So far to the right of the eye, above it and away from it.
-    fn at(right: f64, up: f64, away: f64) -> Self {
+    pub(in crate::render) fn at(right: f64, up: f64, away: f64) -> Self {
         Self {
             place: DVec3::new(right, away, up),
             rgb: [10, 20, 30],
@@ -53,12 +53,16 @@ impl Surfel {
 }
 
 /// A cloud of one node with these attributes of `normal`, `axis_u`, `axis_v`, `radius`.
-fn scene(surfels: &[Surfel], attributes: &[&str]) -> TestScene {
+pub(in crate::render) fn scene(surfels: &[Surfel], attributes: &[&str]) -> TestScene {
     scene_at(DVec3::ZERO, surfels, attributes)
 }
 
 /// The same, moved in the world.
-fn scene_at(shift: DVec3, surfels: &[Surfel], attributes: &[&str]) -> TestScene {
+pub(in crate::render) fn scene_at(
+    shift: DVec3,
+    surfels: &[Surfel],
+    attributes: &[&str],
+) -> TestScene {
     let low = DVec3::splat(-2048.0);
     let offset = (low + shift).to_array();
     let lattice = Lattice { scale: SCALE, offset, origin: [0; 3], side_bits: 32 };
@@ -111,7 +115,7 @@ fn camera(projection: Projection) -> Camera {
 }
 
 /// A pixel is a world unit.
-fn orthographic(size_px: [u32; 2]) -> RenderSettings {
+pub(in crate::render) fn orthographic(size_px: [u32; 2]) -> RenderSettings {
     let height = f64::from(size_px[1]);
     let settings = RenderSettings::new(size_px, camera(Projection::Orthographic { height }));
     RenderSettings { background: BACKGROUND, ..settings }
@@ -119,12 +123,16 @@ fn orthographic(size_px: [u32; 2]) -> RenderSettings {
 
 /// The view spans 90 degrees from the lower to the upper edge: a pixel is a world unit where the
 /// distance is half the height.
-fn perspective(size_px: [u32; 2]) -> RenderSettings {
+pub(in crate::render) fn perspective(size_px: [u32; 2]) -> RenderSettings {
     let projection = Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 };
     RenderSettings { camera: camera(projection), ..orthographic(size_px) }
 }
 
-fn with(splat: Splat, size_px: f32, settings: RenderSettings) -> RenderSettings {
+pub(in crate::render) fn with(
+    splat: Splat,
+    size_px: f32,
+    settings: RenderSettings,
+) -> RenderSettings {
     RenderSettings { splat, splat_size: SplatSize::Pixels(size_px), ..settings }
 }
 
@@ -136,7 +144,7 @@ fn draw(surfels: &[Surfel], attributes: &[&str], settings: &RenderSettings) -> P
     render(&scene(surfels, attributes), settings).picture
 }
 
-fn color_at(picture: &Picture, column: u32, row: u32) -> [u8; 3] {
+pub(in crate::render) fn color_at(picture: &Picture, column: u32, row: u32) -> [u8; 3] {
     let at = 4 * (row * picture.width + column) as usize;
     [picture.rgba8[at], picture.rgba8[at + 1], picture.rgba8[at + 2]]
 }
@@ -146,7 +154,7 @@ fn depth_at(picture: &Picture, column: u32, row: u32) -> f32 {
 }
 
 /// Pixels on which something was drawn: column, row, distance.
-fn drawn(picture: &Picture) -> Vec<(u32, u32, f64)> {
+pub(in crate::render) fn drawn(picture: &Picture) -> Vec<(u32, u32, f64)> {
     let drawn = picture.depth.iter().zip(0..).filter(|(d, _)| d.is_finite());
     drawn.map(|(d, i)| (i % picture.width, i / picture.width, f64::from(*d))).collect()
 }
