@@ -17,6 +17,7 @@ mod inputs;
 mod lod;
 mod memory;
 mod numbers;
+pub mod numerics;
 mod plan;
 mod positioned;
 pub mod readers;
