@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod commands;
 pub mod engine;
+pub mod metrics;
 pub mod path;
 pub mod render;
 pub mod source;

@@ -5,7 +5,7 @@ mod world;
 
 use std::process::Command;
 
-use lodestream_client::render::ssim;
+use lodestream_client::metrics::ssim;
 
 use world::{World, refused, run};
 

@@ -21,9 +21,10 @@ use image::{RgbImage, imageops};
 use lodestream_client::{
     camera::{Camera, Projection},
     engine::{DrawNode, Engine, EngineConfig, FramePlan, View},
+    metrics::ssim,
     render::{
         ColorMode, CpuRenderer, GpuConfig, GpuPath, GpuRenderer, Picture, RenderSettings, Scene,
-        Shading, Splat, SplatSize, TruthRenderer, VisibleTree, ssim,
+        Shading, Splat, SplatSize, TruthRenderer, VisibleTree,
     },
     source::Source,
 };

@@ -5,7 +5,7 @@
 //! colours) and the rules of [`Splat`] (which pixels are covered) are shared; the [`GpuRenderer`]
 //! follows them in f32 and WGSL, the [`CpuRenderer`] in f64. Both draw the same splats, so that one
 //! is the other's test and its stand-in. [`TruthRenderer`] is the CPU renderer for all points of a
-//! dataset, supersampled; [`ssim`] says how far two pictures are apart.
+//! dataset, supersampled; how far two pictures are apart is told by [`metrics`](crate::metrics).
 
 mod color;
 mod cpu;
@@ -17,13 +17,12 @@ mod renderer;
 mod scene;
 mod settings;
 mod size;
-mod ssim;
 mod surface;
 mod tree;
-mod view;
+pub(crate) mod view;
 
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 
@@ -42,8 +41,12 @@ pub use settings::{
     ColorMode, EyeDome, LARGEST_SIDE_PX, LARGEST_SPLAT_PX, RenderSettings, SMALLEST_SPLAT_PX,
     Shading, SizeLimits, Splat, SplatSize,
 };
-pub use ssim::ssim;
 pub use tree::VisibleTree;
+
+pub(crate) use color::NodeColor;
+pub(crate) use ramp::Ramp;
+pub(crate) use scene::Surroundings;
+pub(crate) use surface::NodeSurface;
 
 pub use crate::engine::DrawNode;
 
@@ -62,9 +65,6 @@ pub enum RenderError {
     /// The GPU failed while drawing: draw on the CPU, or with fewer points.
     #[error("the GPU failed: {0}")]
     Gpu(String),
-    /// Pictures of different or too small sizes cannot be compared.
-    #[error("pictures of {0} and {1} pixels cannot be compared")]
-    Compare(String, String),
     /// A picture could not be read.
     #[error("{path}: cannot read the picture: {why}")]
     Read {

@@ -1,8 +1,9 @@
 //! Colour ramps: 256 steps from a number between 0 and 1.
 //!
 //! Elevation takes Turbo (many distinguishable steps, for reading heights), levels take Viridis,
-//! counts Cividis (from blue to yellow, as D. Schütz 2021, 4.1) and intensity greys (all
-//! perceptually even). Classes have no order, and a table. The WGSL twin is `shaders/ramps.wgsl`.
+//! counts Cividis (from blue to yellow, as D. Schütz 2021, 4.1), intensity greys and differences
+//! between pictures Magma, which begins in black (all perceptually even). Classes have no order, and
+//! a table. The WGSL twin is `shaders/ramps.wgsl`.
 
 /// A ramp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,6 +13,7 @@ pub(crate) enum Ramp {
     Level,
     Density,
     Class,
+    Difference,
 }
 
 /// Colours of the classes of the LAS specification (1.4, table 17), in the manner of maps.
@@ -60,6 +62,7 @@ impl Ramp {
             Self::Intensity => colorous::GREYS.eval_continuous(0.9 * (1.0 - t)),
             Self::Level => colorous::VIRIDIS.eval_continuous(t),
             Self::Density => colorous::CIVIDIS.eval_continuous(t),
+            Self::Difference => colorous::MAGMA.eval_continuous(t),
             Self::Class => {
                 return CLASSES.get(usize::from(step)).copied().unwrap_or(OTHER_CLASS);
             }
@@ -84,8 +87,8 @@ mod tests {
     }
 
     #[test]
-    fn intensity_and_level_grow_lighter_all_the_way() {
-        for ramp in [Ramp::Intensity, Ramp::Level, Ramp::Density] {
+    fn ordered_ramps_grow_lighter_all_the_way() {
+        for ramp in [Ramp::Intensity, Ramp::Level, Ramp::Density, Ramp::Difference] {
             let lightness = |[r, g, b]: [u8; 3]| {
                 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)
             };

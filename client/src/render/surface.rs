@@ -73,6 +73,15 @@ impl<'a> NodeSurface<'a> {
         Self { normals, axes: axes.flatten(), radii }
     }
 
+    /// Normals alone: of the attribute, or across the half axes, as far as the node has them.
+    pub fn of_normals(manifest: &Manifest, points: &'a NodePoints) -> Self {
+        let normals = Numbers::of(manifest, "normal", points);
+        let axis = |name| Numbers::of(manifest, name, points);
+        let axes = || Some([axis("axis_u")?, axis("axis_v")?]);
+        let axes = if normals.is_none() { axes() } else { None };
+        Self { normals, axes, radii: None }
+    }
+
     /// The normal of a point, world space, a unit vector; `None` where it has none: the attribute is
     /// absent, zero or not finite.
     pub fn normal(&self, index: usize) -> Option<DVec3> {

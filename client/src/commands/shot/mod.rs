@@ -27,7 +27,8 @@ pub use tour_report::{Arrival, FrameReport, PathReport, TourReport};
 use crate::{
     camera::Camera,
     commands::appearance::Appearance,
-    render::{Coloring, Picture, RenderSettings, ssim},
+    metrics::ssim,
+    render::{Coloring, Picture, RenderSettings},
 };
 
 /// Problems that are written out; the report has them all.

@@ -1,10 +1,13 @@
-//! From samples to pixels: lit, then averaged as they are coded. A pixel's depth is that of its
-//! nearest sample.
+//! From samples to pixels: lit, then averaged as they are coded. A pixel's depth is the median of its
+//! samples'.
 
 use rayon::prelude::*;
 
 use super::{canvas::Canvas, eye_dome::Shades, stage::Stage};
 use crate::render::Picture;
+
+/// Samples of a pixel: 16 by 16 at most.
+const MOST_SAMPLES: usize = 256;
 
 /// The picture of a canvas that is dry.
 pub(super) fn resolve(canvas: &Canvas, stage: &Stage) -> Picture {
@@ -30,19 +33,26 @@ pub(super) fn resolve(canvas: &Canvas, stage: &Stage) -> Picture {
         if samples == 1 {
             return sample(x, y);
         }
-        let (mut sums, mut nearest) = ([0u32; 3], f32::INFINITY);
+        let (mut sums, mut distances) = ([0u32; 3], [f32::INFINITY; MOST_SAMPLES]);
+        let distances = &mut distances[..samples * samples];
+        let mut place = distances.iter_mut();
         for row in y * samples..(y + 1) * samples {
             for column in x * samples..(x + 1) * samples {
                 let (rgb, distance) = sample(column, row);
-                nearest = nearest.min(distance);
+                if let Some(place) = place.next() {
+                    *place = distance;
+                }
                 for (sum, component) in sums.iter_mut().zip(rgb) {
                     *sum += u32::from(component);
                 }
             }
         }
         let count = stage.samples * stage.samples;
+        // Of an even number, the nearer of the two in the middle: half of them cover the pixel.
+        let middle = (distances.len() - 1) / 2;
+        let (_, median, _) = distances.select_nth_unstable_by(middle, f32::total_cmp);
         // Rounded to nearest; the mean of bytes is a byte.
-        (sums.map(|sum| ((sum + count / 2) / count) as u8), nearest)
+        (sums.map(|sum| ((sum + count / 2) / count) as u8), *median)
     };
     let rows = picture.rgba8.par_chunks_exact_mut(4 * width);
     rows.zip(picture.depth.par_chunks_exact_mut(width)).enumerate().for_each(

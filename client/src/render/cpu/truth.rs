@@ -3,14 +3,28 @@
 //! Nodes come one after the other and are drawn in batches, so that a dataset of any size passes
 //! through; for blended splats it passes twice. Each pixel is `samples` by `samples` samples,
 //! box-filtered: their colours (background included) are averaged as they are coded, the values that
-//! a display takes and that errors are measured on. A pixel's depth is that of its nearest sample.
+//! a display takes and that errors are measured on.
+//!
+//! A pixel's depth is the median of its samples', those on which nothing was drawn being infinitely
+//! far: a pixel is covered where at least half of it is. A picture of one sample takes its depth from
+//! one place of the pixel; the median has the least mean difference from what it may find there. The
+//! nearest sample would make every rim up to a pixel wider and every slope nearer, so that the best
+//! of pictures had holes; the mean would be of no surface at all.
+//!
 //! Splats have the size that they have in a picture of the same settings, at least one pixel (not
-//! one sample): the truth is the same picture, better sampled. A
-//! [`Splat::Point`] is a one-pixel square, placed to the sample. Counts of points per pixel are what
-//! they are: they have one sample a pixel, always.
+//! one sample): the truth is the same picture, better sampled. Where the size is `adaptive` (or `own`,
+//! of a cloud without radii) and the tree is of all nodes, it follows the spacing that the points
+//! have where they are. A [`Splat::Point`] is a one-pixel square, placed to the sample. Counts of
+//! points per pixel are what they are: they have one sample a pixel, always.
+//!
+//! The samples of all pixels are one regular grid, which [`jittered`](TruthRenderer::jittered) moves as
+//! a whole, by less than a sample. How far two truths of different seeds are apart tells how far one
+//! is to be trusted. Not each sample by itself: footprints would have to ask for the place of every
+//! sample that they test, and pictures, which have one a pixel, would pay for it.
 
 use std::sync::Arc;
 
+use glam::DVec2;
 use lodestream_protocol::Manifest;
 
 use super::{batch::Batch, blend, canvas::Canvas, resolve::resolve, stage::Stage};
@@ -90,6 +104,17 @@ impl TruthRenderer {
             earlier: Vec::new(),
             drawn: FrameStatistics::default(),
         })
+    }
+
+    /// Moves all samples by up to half the distance between two, as the seed says: to the right or
+    /// left, up or down. Counts of points per pixel stay where they are.
+    #[must_use]
+    pub fn jittered(mut self, seed: u64) -> Self {
+        if self.stage.settings.color != ColorMode::Density {
+            let mut random = fastrand::Rng::with_seed(seed);
+            self.stage.view.half_size_px += DVec2::new(random.f64(), random.f64()) - 0.5;
+        }
+        self
     }
 
     /// For nodes that are in memory anyway: gathers as many as can be drawn at once, so that colours

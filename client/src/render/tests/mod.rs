@@ -16,11 +16,11 @@ use lodestream_protocol::{Lattice, Manifest};
 use crate::{
     camera::{Camera, Projection},
     engine::DrawNode,
+    metrics::ssim,
     render::{
         ColorMode, CpuRenderer, Frame, GpuConfig, GpuRenderer, Picture, RenderSettings, Scene,
         Splat, SplatSize, TruthRenderer,
         ramp::Ramp,
-        ssim,
         testing::{self, Point, TestScene, cloud, landscape},
     },
 };

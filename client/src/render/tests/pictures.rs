@@ -432,12 +432,12 @@ fn the_truth_averages_its_samples() {
         ..settings
     };
     let picture = truth(&scene.scene(), &settings, 4);
-    let drawn = drawn(&picture);
-    assert_eq!(drawn, [(14, 9), (15, 9), (14, 10), (15, 10)]);
-    for (x, y) in drawn {
+    for (x, y) in [(14, 9), (15, 9), (14, 10), (15, 10)] {
         assert_eq!(color_at(&picture, x, y), [85, 95, 105], "3/4 background, 1/4 point");
     }
-    assert_eq!(color_at(&picture, 0, 0), [110, 120, 130]);
+    let inked = picture.rgba8.chunks_exact(4).filter(|pixel| pixel[..3] != [110, 120, 130]);
+    assert_eq!(inked.count(), 4);
+    assert_eq!(drawn(&picture), [], "none is covered by half");
 }
 
 #[test]

@@ -84,24 +84,69 @@ fn blended_truth_is_the_blended_picture_better_sampled() {
     add_all(&mut sampled, &scene);
     let sampled = sampled.finish().expect("complete").picture;
     let picture = render(&scene, &settings).picture;
-    let similarity = crate::render::ssim(&sampled, &picture).expect("same size");
+    let similarity = crate::metrics::ssim(&sampled, &picture).expect("same size");
     assert!(similarity > 0.85 && similarity < 1.0, "{similarity}");
 }
 
 #[test]
-fn a_pixel_is_as_far_as_its_nearest_sample() {
-    // A fifth of a pixel from the left and from the right edge of the same one.
-    for nearer in [-0.3, 0.3] {
-        let surfels = [Surfel::at(nearer, 0.0, 10.0), Surfel::at(-nearer, 0.0, 12.0)];
+fn a_pixel_is_as_far_as_the_median_of_its_samples() {
+    // The nearer point covers a column of samples of the pixel at the left, three of the middle one;
+    // or two and two.
+    for (left, depths) in [(-0.2, [f32::INFINITY, 10.0, 12.0]), (-0.5, [10.0, 10.0, 12.0])] {
+        let surfels = [Surfel::at(left, 0.0, 10.0), Surfel::at(0.6, 0.0, 12.0)];
         let scene = scene(&surfels, &[]);
         let mut truth = truth(&scene, &with(Splat::Point, 1.0, orthographic([5, 5])), 4);
         add_all(&mut truth, &scene);
         let picture = truth.finish().expect("complete").picture;
-        assert_eq!(depth_at(&picture, 2, 2), 10.0);
-        let beside = if nearer < 0.0 { 3 } else { 1 };
-        assert_eq!(
-            [depth_at(&picture, beside, 2), depth_at(&picture, 4 - beside, 2)],
-            [12.0, 10.0]
-        );
+        assert_eq!([1, 2, 3].map(|column| depth_at(&picture, column, 2)), depths, "{left}");
+        assert_ne!(color_at(&picture, 1, 2), BACKGROUND, "colours are of all samples");
+    }
+}
+
+#[test]
+fn a_seed_moves_the_samples_by_less_than_one() {
+    let surfel = Surfel::at(0.4, 0.3, 10.0);
+    let scene = scene(&[surfel], &[]);
+    let settings = with(Splat::Square, 4.0, orthographic([9, 9]));
+    let picture = |jitter: Option<u64>| {
+        let truth = truth(&scene, &settings, 4);
+        let mut truth = jitter.into_iter().fold(truth, TruthRenderer::jittered);
+        add_all(&mut truth, &scene);
+        truth.finish().expect("complete").picture
+    };
+    let still = picture(None);
+    let all: Vec<_> = (0..64).map(|seed| picture(Some(seed))).collect();
+    assert_eq!(all[7], picture(Some(7)), "the same seed, the same picture");
+    assert!(all.iter().any(|jittered| *jittered != all[0]), "another seed, another picture");
+    // 4 by 4 pixels, whatever the seed.
+    let [ink, paper] = [30, BACKGROUND[2]].map(f64::from);
+    for jittered in all.iter().chain([&still]) {
+        let shares =
+            jittered.rgba8.chunks_exact(4).map(|p| (f64::from(p[2]) - paper) / (ink - paper));
+        let area: f64 = shares.sum();
+        assert!((area - 16.0).abs() < 0.5, "{area}");
+    }
+}
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let (scene, settings) = world();
+    for splat in [Splat::Circle, Splat::Blended] {
+        let settings = RenderSettings { splat, ..settings };
+        let draw = || {
+            let mut truth = truth(&scene, &settings, 4).jittered(3);
+            for pass in 0..truth.passes() {
+                if pass > 0 {
+                    truth.next_pass().expect("a further pass");
+                }
+                add_all(&mut truth, &scene);
+            }
+            truth.finish().expect("complete")
+        };
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.expect("threads").install(draw)
+        };
+        assert!(with(1) == with(5), "{splat:?}");
     }
 }
