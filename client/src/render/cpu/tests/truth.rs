@@ -1,7 +1,10 @@
 //! Passes and batches of the truth.
 
 use super::*;
-use crate::render::{ColorMode, TruthRenderer, testing::landscape};
+use crate::{
+    metrics::PictureError,
+    render::{ColorMode, TruthRenderer, testing::landscape},
+};
 
 fn truth(scene: &TestScene, settings: &RenderSettings, samples: u32) -> TruthRenderer {
     TruthRenderer::new(settings, &scene.clouds, scene.scene().tree(), samples).expect("possible")
@@ -125,6 +128,32 @@ fn a_seed_moves_the_samples_by_less_than_one() {
             jittered.rgba8.chunks_exact(4).map(|p| (f64::from(p[2]) - paper) / (ink - paper));
         let area: f64 = shares.sum();
         assert!((area - 16.0).abs() < 0.5, "{area}");
+    }
+}
+
+#[test]
+fn truths_of_two_seeds_are_farther_apart_than_either_is_from_a_better_one() {
+    let (scene, settings) = world();
+    let picture = |samples, seed: Option<u64>| {
+        let mut truth =
+            seed.into_iter().fold(truth(&scene, &settings, samples), TruthRenderer::jittered);
+        add_all(&mut truth, &scene);
+        truth.finish().expect("complete").picture
+    };
+    let error = |a: &Picture, b: &Picture| PictureError::between(a, b).expect("of one size");
+    let better = picture(16, None);
+    let truths: Vec<_> = (0..4).map(|seed| picture(4, Some(seed))).collect();
+    for pair in truths.windows(2) {
+        let floor = error(&pair[0], &pair[1]);
+        let from_better = error(&pair[0], &better);
+        assert!(floor.mse > from_better.mse, "{floor:?} {from_better:?}");
+        assert!(floor.ssim < from_better.ssim, "{floor:?} {from_better:?}");
+        // What the truth is to be better than: a picture of one sample.
+        let rough = error(&picture(1, None), &better);
+        assert!(rough.mse > Some(4.0 * floor.mse.expect("pixels")), "{floor:?} {rough:?}");
+        // Only at rims is a pixel covered by one and not by the other.
+        let holes = floor.coverage.holes.of_covered.expect("covered");
+        assert!(holes < 0.03, "{floor:?}");
     }
 }
 
