@@ -1,5 +1,7 @@
 //! What the engine is told once.
 
+use lodestream_protocol::BOOT_SPECULATIVE_BYTES;
+
 /// Settings of an engine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EngineConfig {
@@ -15,9 +17,25 @@ pub struct EngineConfig {
     pub requests_in_flight: usize,
     /// Which neighbouring ranges are fetched with one request.
     pub coalesce: Coalesce,
+    /// In which order wanted pieces are loaded.
+    pub order: LoadOrder,
+    /// Whether requests that nothing wants any more are broken off.
+    pub cancels: bool,
+    /// Bytes that the first request asks for: header, manifest and root page, and what lies behind
+    /// them, which are the payloads of the top nodes. The header at least.
+    pub speculative_bytes: u64,
     /// Attributes that the view needs besides positions. Their column groups are fetched; the
     /// others are not. Names that a cloud lacks are ignored.
     pub attributes: Vec<String>,
+}
+
+/// In which order wanted pieces are loaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LoadOrder {
+    /// As they matter to the newest view.
+    Importance,
+    /// As they were first wanted: a queue. (Fraiss 2017, 3.2.6)
+    Arrival,
 }
 
 /// Which neighbouring ranges are fetched with one request.
@@ -27,6 +45,11 @@ pub struct Coalesce {
     pub gap_bytes: u64,
     /// Most bytes of one request; a single range may be longer.
     pub span_bytes: u64,
+}
+
+impl Coalesce {
+    /// A request for every range.
+    pub const NONE: Self = Self { gap_bytes: 0, span_bytes: 0 };
 }
 
 impl Default for Coalesce {
@@ -46,6 +69,9 @@ impl Default for EngineConfig {
             cache_bytes: 512 << 20,
             requests_in_flight: 6,
             coalesce: Coalesce::default(),
+            order: LoadOrder::Importance,
+            cancels: true,
+            speculative_bytes: BOOT_SPECULATIVE_BYTES,
             attributes: vec!["color".into()],
         }
     }

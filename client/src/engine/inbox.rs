@@ -14,6 +14,8 @@ use super::{event::Event, piece::Piece, view::View};
 pub(super) struct TraversalInbox {
     state: Mutex<TraversalMail>,
     news: Condvar,
+    /// The same news for a reader that is a task. Stores one permit.
+    told: tokio::sync::Notify,
 }
 
 /// The newest of everything.
@@ -44,7 +46,7 @@ impl TraversalInbox {
             mail.unread_view = true;
             mail.generation += 1;
             changed(mail.generation);
-            self.news.notify_one();
+            self.tell();
         }
         mail.generation
     }
@@ -55,7 +57,7 @@ impl TraversalInbox {
         mail.attributes = Some(attributes);
         mail.generation += 1;
         changed(mail.generation);
-        self.news.notify_one();
+        self.tell();
         mail.generation
     }
 
@@ -70,34 +72,56 @@ impl TraversalInbox {
         let mut mail = lock(&self.state);
         mail.events.push(event);
         mail.posted += 1;
-        self.news.notify_one();
+        self.tell();
         mail.posted
     }
 
     /// Tells the thread to end.
     pub fn shut_down(&self) {
         lock(&self.state).shutdown = true;
-        self.news.notify_one();
+        self.tell();
     }
 
     /// Waits for news and takes all of it.
     pub fn take(&self) -> TraversalMail {
         let mut mail = lock(&self.state);
-        while mail.events.is_empty()
-            && mail.attributes.is_none()
-            && !mail.unread_view
-            && !mail.shutdown
-        {
+        while !mail.is_news() {
             mail = self.news.wait(mail).unwrap_or_else(PoisonError::into_inner);
         }
-        mail.unread_view = false;
-        TraversalMail {
-            view: mail.view,
-            attributes: mail.attributes.take(),
-            generation: mail.generation,
-            events: std::mem::take(&mut mail.events),
-            posted: mail.posted,
-            shutdown: mail.shutdown,
+        mail.collect()
+    }
+
+    /// Takes all there is, if that is anything.
+    pub fn try_take(&self) -> Option<TraversalMail> {
+        let mut mail = lock(&self.state);
+        mail.is_news().then(|| mail.collect())
+    }
+
+    /// Ends once something has been posted since the last call that ended.
+    pub async fn posted(&self) {
+        self.told.notified().await;
+    }
+
+    fn tell(&self) {
+        self.news.notify_one();
+        self.told.notify_one();
+    }
+}
+
+impl TraversalMail {
+    const fn is_news(&self) -> bool {
+        !self.events.is_empty() || self.attributes.is_some() || self.unread_view || self.shutdown
+    }
+
+    fn collect(&mut self) -> Self {
+        self.unread_view = false;
+        Self {
+            view: self.view,
+            attributes: self.attributes.take(),
+            generation: self.generation,
+            events: std::mem::take(&mut self.events),
+            posted: self.posted,
+            shutdown: self.shutdown,
             unread_view: false,
         }
     }

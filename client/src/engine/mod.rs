@@ -19,8 +19,10 @@ mod inbox;
 mod loader;
 mod piece;
 mod plan;
+mod policy;
 mod selection;
 mod shared;
+mod simulated;
 mod stats;
 mod store;
 mod traversal;
@@ -32,11 +34,14 @@ use std::{sync::Arc, thread::JoinHandle, time::Duration};
 use lodestream_protocol::Boot;
 
 pub use board::CloudStatus;
-pub use config::{Coalesce, EngineConfig};
+pub use config::{Coalesce, EngineConfig, LoadOrder};
 pub use error::EngineError;
 pub use plan::{DrawNode, FramePlan, LeftOut, Tally};
+pub use policy::Policy;
+pub use simulated::SimulatedEngine;
 pub use stats::{EngineStats, Phase, Totals};
 pub use view::View;
+pub(crate) use view::{Optics, WorldBox};
 
 use self::{
     board::News,
@@ -106,18 +111,15 @@ impl Engine {
     /// Sets the view; the newest one counts. Never waits. Returns the view's number, which
     /// [`FramePlan::view_generation`] repeats; the same view again keeps its number.
     pub fn set_view(&self, view: View) -> u64 {
-        self.shared.traversal.set_view(view, |generation| self.start_phase(generation))
+        self.shared.traversal.set_view(view, |generation| self.shared.start_phase(generation))
     }
 
     /// Sets the attributes that the view needs (see [`EngineConfig::attributes`]); counts as a new
     /// view. Never waits.
     pub fn set_attributes(&self, attributes: Vec<String>) -> u64 {
-        self.shared.traversal.set_attributes(attributes, |generation| self.start_phase(generation))
-    }
-
-    fn start_phase(&self, generation: u64) {
-        let totals = self.shared.counters.totals();
-        self.shared.clock(|clock| clock.start_view(generation, totals));
+        self.shared
+            .traversal
+            .set_attributes(attributes, |generation| self.shared.start_phase(generation))
     }
 
     /// The newest plan. Never waits.
@@ -174,18 +176,7 @@ impl Engine {
     /// Figures since the start and since the view last changed.
     #[must_use]
     pub fn stats(&self) -> EngineStats {
-        let counters = &self.shared.counters;
-        let totals = counters.totals();
-        let (since_start, since_view) = self.shared.clock(|clock| clock.phases(totals));
-        EngineStats {
-            since_start,
-            since_view,
-            queued: counters.queued.get(),
-            in_flight: counters.in_flight.get(),
-            pinned_bytes: counters.pinned_bytes.get(),
-            cached_bytes: counters.cached_bytes.get(),
-            problems: self.shared.board.read(|news| news.problems.clone()),
-        }
+        self.shared.stats()
     }
 }
 

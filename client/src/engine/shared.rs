@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use super::{
     board::Board,
     inbox::{LoaderInbox, TraversalInbox},
-    stats::{Clock, Counters},
+    stats::{Clock, Counters, EngineStats},
 };
 
 /// Letter boxes, the board and the figures. No two locks are ever held at once, save for the clock
@@ -27,6 +27,28 @@ impl Shared {
             board: Board::new(sources),
             counters: Counters::default(),
             clock: Mutex::new(Clock::new()),
+        }
+    }
+
+    /// The view has changed.
+    pub fn start_phase(&self, generation: u64) {
+        let totals = self.counters.totals();
+        self.clock(|clock| clock.start_view(generation, totals));
+    }
+
+    /// Figures so far.
+    pub fn stats(&self) -> EngineStats {
+        let counters = &self.counters;
+        let totals = counters.totals();
+        let (since_start, since_view) = self.clock(|clock| clock.phases(totals));
+        EngineStats {
+            since_start,
+            since_view,
+            queued: counters.queued.get(),
+            in_flight: counters.in_flight.get(),
+            pinned_bytes: counters.pinned_bytes.get(),
+            cached_bytes: counters.cached_bytes.get(),
+            problems: self.board.read(|news| news.problems.clone()),
         }
     }
 

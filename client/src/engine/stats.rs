@@ -2,10 +2,12 @@
 
 use std::{
     sync::atomic::{AtomicU64, Ordering},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use serde::Serialize;
+// Its clock can be a simulated one.
+use tokio::time::Instant;
 
 use super::plan::FramePlan;
 

@@ -73,12 +73,17 @@ impl Traversal {
             if mail.shutdown {
                 return;
             }
-            let seen = mail.posted;
-            if self.read(mail) {
-                self.select();
-            }
-            self.publish(seen);
+            self.step(mail);
         }
+    }
+
+    /// Takes in the news and tells what comes of it.
+    pub fn step(&mut self, mail: TraversalMail) {
+        let seen = mail.posted;
+        if self.read(mail) {
+            self.select();
+        }
+        self.publish(seen);
     }
 
     /// Takes in the news; returns whether another selection may be wanted.

@@ -22,7 +22,7 @@ pub struct View {
 
 /// A box in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct WorldBox {
+pub(crate) struct WorldBox {
     pub center: DVec3,
     /// Half of the extent on each axis.
     pub half: DVec3,
@@ -30,7 +30,7 @@ pub(super) struct WorldBox {
 
 /// A view, prepared for many boxes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Optics {
+pub(crate) struct Optics {
     eye: DVec3,
     forward: DVec3,
     /// A point `p` is inside where `normal · (p - eye) + distance >= 0` for all planes.

@@ -78,6 +78,11 @@ impl FileSource {
         Ok(Prefix { bytes, total: Some(self.inner.len) })
     }
 
+    /// Reads on this thread.
+    pub(super) fn read_now(&self, offset: u64, len: u64) -> Result<Bytes, SourceError> {
+        self.inner.read(offset, len)
+    }
+
     async fn read(&self, offset: u64, len: u64) -> Result<Bytes, SourceError> {
         let inner = Arc::clone(&self.inner);
         tokio::task::spawn_blocking(move || inner.read(offset, len)).await.unwrap_or_else(|e| {

@@ -11,7 +11,11 @@ mod blocking;
 mod error;
 mod file;
 mod http;
+mod link;
+mod linked;
 mod locator;
+
+use std::sync::Arc;
 
 use bytes::{Bytes, BytesMut};
 
@@ -20,6 +24,8 @@ pub use blocking::BlockingSource;
 pub use error::SourceError;
 pub use file::FileSource;
 pub use http::{HttpSource, Timeouts};
+pub use link::{Link, LinkSpec};
+pub use linked::LinkedSource;
 
 /// Most bytes that are reserved before any of them has arrived.
 const RESERVE_BYTES: u64 = 4 << 20;
@@ -34,6 +40,8 @@ pub enum Source {
     Http(HttpSource),
     /// A local file.
     File(FileSource),
+    /// A local file behind a made-up link.
+    Linked(LinkedSource),
 }
 
 /// The first bytes of a dataset file.
@@ -57,12 +65,19 @@ impl Source {
         locator::parse(text)
     }
 
+    /// The file behind a made-up link, for measuring what links do.
+    #[must_use]
+    pub const fn linked(file: FileSource, link: Arc<Link>) -> Self {
+        Self::Linked(LinkedSource::new(file, link))
+    }
+
     /// The source for people: a path, or a URL without credentials and query.
     #[must_use]
     pub fn describe(&self) -> String {
         match self {
             Self::Http(source) => source.describe(),
             Self::File(source) => source.describe(),
+            Self::Linked(source) => source.describe(),
         }
     }
 
@@ -82,6 +97,7 @@ impl Source {
             _ if len == 0 => Ok(()),
             Self::Http(source) => source.stream_range(offset, len, sink).await,
             Self::File(source) => source.stream_range(offset, len, sink).await,
+            Self::Linked(source) => source.stream_range(offset, len, sink).await,
         }
     }
 
@@ -103,6 +119,7 @@ impl Source {
         match self {
             Self::Http(source) => source.read_prefix(len).await,
             Self::File(source) => source.read_prefix(len).await,
+            Self::Linked(source) => source.read_prefix(len).await,
         }
     }
 
@@ -114,6 +131,7 @@ impl Source {
         match self {
             Self::Http(source) => source.size().await,
             Self::File(source) => Ok(source.len()),
+            Self::Linked(source) => Ok(source.len()),
         }
     }
 }

@@ -15,12 +15,15 @@ mod pieces;
 use std::{
     collections::{HashMap, HashSet},
     sync::Arc,
-    time::Instant,
 };
 
 use bytes::Bytes;
 use lodestream_protocol::{Boot, Error};
-use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::{
+    sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel},
+    // Its clock can be a simulated one.
+    time::Instant,
+};
 
 use crate::source::{Backoff, Source, SourceError};
 
@@ -32,7 +35,7 @@ use self::{
     pieces::{PieceState, Pieces},
 };
 use super::{
-    config::EngineConfig,
+    config::{EngineConfig, LoadOrder},
     event::Event,
     inbox::Demand,
     piece::{Part, Piece, PieceId},
@@ -88,9 +91,14 @@ pub(super) struct Loader {
     config: EngineConfig,
     clouds: Vec<Cloud>,
     demand: Vec<Piece>,
+    /// When each wanted piece was first wanted, where pieces are loaded in that order.
+    turns: HashMap<PieceId, u64>,
+    next_turn: u64,
     pieces: Pieces,
     flights: HashMap<FlightId, Flight>,
     next_flight: FlightId,
+    /// Decode at once, on this thread: simulated time must not pass meanwhile.
+    decode_inline: bool,
     sender: UnboundedSender<Message>,
     receiver: UnboundedReceiver<Message>,
 }
@@ -111,12 +119,20 @@ impl Loader {
             config,
             clouds: clouds.collect(),
             demand: Vec::new(),
+            turns: HashMap::new(),
+            next_turn: 0,
             pieces: Pieces::default(),
             flights: HashMap::new(),
             next_flight: 0,
+            decode_inline: false,
             sender,
             receiver,
         }
+    }
+
+    /// The same, decoding on its own thread.
+    pub fn decoding_inline(self) -> Self {
+        Self { decode_inline: true, ..self }
     }
 
     /// Runs until the inbox says to end.
@@ -124,15 +140,18 @@ impl Loader {
         for cloud in 0..self.clouds.len() {
             let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
             let source = self.clouds[cloud].source.clone();
+            let speculative = self.config.speculative_bytes;
             tokio::spawn(async move {
-                let result = open::open(&shared, cloud, &source).await;
+                let result = open::open(&shared, cloud, &source, speculative).await;
                 let _ = sender.send(Message::Opened { cloud, result });
             });
         }
         loop {
             let shared = Arc::clone(&self.shared);
             let retry = self.next_retry();
+            // In this order, so that a simulated run repeats; all of them are looked at each time.
             tokio::select! {
+                biased;
                 mail = shared.loader.take() => {
                     if mail.shutdown {
                         return;
@@ -157,6 +176,12 @@ impl Loader {
         self.demand = demand.pieces;
         let wanted: HashSet<_> = self.demand.iter().map(|piece| piece.id).collect();
         self.pieces.update(&wanted, demand.seen);
+        if self.config.order == LoadOrder::Arrival {
+            self.take_turns(&wanted);
+        }
+        if !self.config.cancels {
+            return;
+        }
         let pieces = &self.pieces;
         let stale = self.flights.extract_if(|id, flight| {
             let mut open = flight.pieces.iter().filter(|piece| pieces.is_loading(piece.id, *id));
@@ -167,6 +192,18 @@ impl Loader {
             self.shared.counters.cancelled.add(1);
             self.break_off(id, &flight);
         }
+    }
+
+    /// Puts the demand into the order in which its pieces were first wanted.
+    fn take_turns(&mut self, wanted: &HashSet<PieceId>) {
+        self.turns.retain(|id, _| wanted.contains(id));
+        for piece in &self.demand {
+            self.turns.entry(piece.id).or_insert_with(|| {
+                self.next_turn += 1;
+                self.next_turn
+            });
+        }
+        self.demand.sort_by_key(|piece| self.turns.get(&piece.id).copied());
     }
 
     fn break_off(&mut self, id: FlightId, flight: &Flight) {
@@ -208,11 +245,16 @@ impl Loader {
         let size = decode::decoded_bytes(&piece, &boot.manifest);
         self.pieces.set(piece.id, PieceState::Decoding { bytes: size });
         let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
-        rayon::spawn(move || {
+        let work = move || {
             let (result, nanos) = decode::decode(&piece, &boot, &bytes);
             shared.counters.decode_nanos.add(nanos);
             let _ = sender.send(Message::Decoded { piece: piece.id, result });
-        });
+        };
+        if self.decode_inline {
+            work();
+        } else {
+            rayon::spawn(work);
+        }
     }
 
     fn deliver(&mut self, id: PieceId, result: Result<Decoded, Error>) {
@@ -388,7 +430,7 @@ impl Loader {
 
 async fn sleep_until(at: Option<Instant>) {
     match at {
-        Some(at) => tokio::time::sleep_until(at.into()).await,
+        Some(at) => tokio::time::sleep_until(at).await,
         None => std::future::pending().await,
     }
 }

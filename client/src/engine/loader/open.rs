@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytes::{Bytes, BytesMut};
-use lodestream_protocol::{BOOT_SPECULATIVE_BYTES, Boot, Error, Header};
+use lodestream_protocol::{Boot, Error, HEADER_BYTES, Header};
 
 use crate::source::{Backoff, Source, SourceError};
 
@@ -17,14 +17,19 @@ pub struct Opened {
     pub prefix: Bytes,
 }
 
-/// Opens `source`, trying again for as long as that may help.
+/// Opens `source`, trying again for as long as that may help; asks for `speculative` bytes at first.
 ///
 /// # Errors
 /// What is wrong for good, with the source's name.
-pub async fn open(shared: &Shared, cloud: usize, source: &Source) -> Result<Opened, String> {
+pub async fn open(
+    shared: &Shared,
+    cloud: usize,
+    source: &Source,
+    speculative: u64,
+) -> Result<Opened, String> {
     let mut failures = 0;
     loop {
-        match try_open(shared, source).await {
+        match try_open(shared, source, speculative).await {
             Ok(opened) => {
                 shared.board.post(|news| news.clouds[cloud].trouble = None);
                 return Ok(opened);
@@ -58,9 +63,9 @@ impl From<Error> for Failure {
     }
 }
 
-async fn try_open(shared: &Shared, source: &Source) -> Result<Opened, Failure> {
+async fn try_open(shared: &Shared, source: &Source, speculative: u64) -> Result<Opened, Failure> {
     shared.counters.requests.add(1);
-    let first = source.read_prefix(BOOT_SPECULATIVE_BYTES).await?;
+    let first = source.read_prefix(speculative.max(HEADER_BYTES as u64)).await?;
     shared.counters.bytes.add(first.bytes.len() as u64);
     let header = Header::parse(&first.bytes)?;
     if let Some(total) = first.total

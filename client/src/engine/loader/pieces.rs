@@ -3,10 +3,9 @@
 //! A wanted piece without a state is queued. A delivered piece keeps its state until the traversal
 //! says that it has read it: a demand that was written before would ask for it again.
 
-use std::{
-    collections::{HashMap, HashSet},
-    time::Instant,
-};
+use std::collections::{HashMap, HashSet};
+
+use tokio::time::Instant;
 
 use super::{super::piece::PieceId, flight::FlightId};
 
