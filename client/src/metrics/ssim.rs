@@ -12,7 +12,7 @@
 
 use rayon::prelude::*;
 
-use super::{MetricsError, same_size, size};
+use super::{MetricsError, same_size};
 use crate::render::{Picture, Ramp};
 
 /// Side of the window in pixels: pictures that are smaller either way have no similarity.
@@ -84,42 +84,61 @@ impl Map {
         rows.collect::<Vec<_>>().iter().sum::<f64>() / self.values.len() as f64
     }
 
-    /// Of two planes `width` wide in which the window fits.
-    fn of(a: &[f64], b: &[f64], width: usize, window: &Window) -> Self {
-        let columns = width - window.size() + 1;
-        let rows = a.len() / width - window.size() + 1;
-        let mut values = vec![0.0; columns * rows];
+    /// Of what `value` makes of the pixels (red, green, blue, alpha) of two pictures of one size.
+    ///
+    /// # Errors
+    /// [`MetricsError`] where the sizes differ, or the window does not fit.
+    fn of(
+        [a, b]: [&Picture; 2],
+        window: &Window,
+        value: impl Fn(&[u8; 4]) -> f64 + Sync,
+    ) -> Result<Self, MetricsError> {
+        same_size(a, b)?;
+        let (width, height, size) = (a.width as usize, a.height as usize, window.size());
+        if width.min(height) < size {
+            return Err(MetricsError::TooSmall(super::size(a)));
+        }
+        let columns = width - size + 1;
+        let mut values = vec![0.0; columns * (height - size + 1)];
         let tasks = values.par_chunks_mut(TASK_ROWS * columns).enumerate();
         tasks.for_each(|(task, values)| {
             let first = task * TASK_ROWS;
-            let last = first + values.len() / columns + window.size() - 1;
-            let strip = first * width..last * width;
-            similarities(&a[strip.clone()], &b[strip], width, window, values);
+            let rows = first..first + values.len() / columns + size - 1;
+            let [a, b] = [a, b].map(|picture| {
+                let pixels = picture.rgba8.as_chunks().0;
+                pixels[rows.start * width..rows.end * width].chunks_exact(width)
+            });
+            similarities(a.zip(b), window, &value, columns, values);
         });
-        Self { values, columns }
+        Ok(Self { values, columns })
     }
 }
 
-/// The similarities of a strip: of all its places where the window lies inside.
-fn similarities(a: &[f64], b: &[f64], width: usize, window: &Window, values: &mut [f64]) {
-    let columns = width - window.size() + 1;
-    let rows = a.len() / width;
+/// The similarities of a strip of two pictures: at all its places where the window lies inside.
+fn similarities<'a>(
+    rows: impl Iterator<Item = (&'a [[u8; 4]], &'a [[u8; 4]])>,
+    window: &Window,
+    value: &impl Fn(&[u8; 4]) -> f64,
+    columns: usize,
+    values: &mut [f64],
+) {
     // Along rows first, then down columns. Planes of a, b, a² + b² and ab.
-    let mut filtered = [0; 4].map(|_| vec![0.0; rows * columns]);
-    let mut moment = vec![0.0; width];
-    for (row, (a, b)) in a.chunks_exact(width).zip(b.chunks_exact(width)).enumerate() {
-        let [mean_a, mean_b, squares, products] =
-            filtered.each_mut().map(|plane| &mut plane[row * columns..(row + 1) * columns]);
-        window.sum(|i| &a[i..i + columns], mean_a);
-        window.sum(|i| &b[i..i + columns], mean_b);
-        for (moment, (a, b)) in moment.iter_mut().zip(a.iter().zip(b)) {
-            *moment = a * a + b * b;
+    let plane = values.len() + (window.size() - 1) * columns;
+    let mut filtered = [0; 4].map(|_| vec![0.0; plane]);
+    let mut moments = [0; 4].map(|_| vec![0.0; columns + window.size() - 1]);
+    for (row, (a_pixels, b_pixels)) in rows.enumerate() {
+        let [a, b, squares, product] = &mut moments;
+        for (x, (a_pixel, b_pixel)) in a_pixels.iter().zip(b_pixels).enumerate() {
+            (a[x], b[x]) = (value(a_pixel), value(b_pixel));
         }
-        window.sum(|i| &moment[i..i + columns], squares);
-        for (moment, (a, b)) in moment.iter_mut().zip(a.iter().zip(b)) {
-            *moment = a * b;
+        for ((a, b), (square, product)) in a.iter().zip(&*b).zip(squares.iter_mut().zip(product)) {
+            *square = a * a + b * b;
+            *product = a * b;
         }
-        window.sum(|i| &moment[i..i + columns], products);
+        for (moment, plane) in moments.iter().zip(&mut filtered) {
+            let sums = &mut plane[row * columns..(row + 1) * columns];
+            window.sum(|i| &moment[i..i + columns], sums);
+        }
     }
     let mut sums = [0; 4].map(|_| vec![0.0; columns]);
     for (y, values) in values.chunks_exact_mut(columns).enumerate() {
@@ -185,31 +204,17 @@ impl Window {
 }
 
 pub(super) fn luma_map(a: &Picture, b: &Picture, window: &Window) -> Result<Map, MetricsError> {
-    fits(a, b, window)?;
     // ITU-R BT.601, 0 to 255.
-    let luma =
-        |p: &[u8]| 0.299 * f64::from(p[0]) + 0.587 * f64::from(p[1]) + 0.114 * f64::from(p[2]);
-    let [a_luma, b_luma] = [a, b].map(|picture| plane(picture, luma));
-    Ok(Map::of(&a_luma, &b_luma, a.width as usize, window))
+    Map::of([a, b], window, |[red, green, blue, _]| {
+        0.299 * f64::from(*red) + 0.587 * f64::from(*green) + 0.114 * f64::from(*blue)
+    })
 }
 
 pub(super) fn color_mean(a: &Picture, b: &Picture, window: &Window) -> Result<f64, MetricsError> {
-    fits(a, b, window)?;
     let mean = |component: usize| {
-        let [a_plane, b_plane] = [a, b].map(|picture| plane(picture, |p| f64::from(p[component])));
-        Map::of(&a_plane, &b_plane, a.width as usize, window).mean()
+        Map::of([a, b], window, |pixel| f64::from(pixel[component])).map(|map| map.mean())
     };
-    Ok((mean(0) + mean(1) + mean(2)) / 3.0)
-}
-
-fn plane(picture: &Picture, value: impl Fn(&[u8]) -> f64 + Send + Sync) -> Vec<f64> {
-    picture.rgba8.par_chunks_exact(4).map(value).collect()
-}
-
-fn fits(a: &Picture, b: &Picture, window: &Window) -> Result<(), MetricsError> {
-    same_size(a, b)?;
-    let fits = (a.width.min(a.height) as usize) >= window.size();
-    if fits { Ok(()) } else { Err(MetricsError::TooSmall(size(a))) }
+    Ok((mean(0)? + mean(1)? + mean(2)?) / 3.0)
 }
 
 #[cfg(test)]
