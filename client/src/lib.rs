@@ -6,4 +6,6 @@ pub mod engine;
 pub mod metrics;
 pub mod path;
 pub mod render;
+pub mod report;
 pub mod source;
+pub mod stability;

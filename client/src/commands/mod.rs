@@ -4,3 +4,4 @@ pub mod appearance;
 pub mod demo;
 pub mod export;
 pub mod shot;
+pub mod stability;

@@ -16,10 +16,10 @@ use crate::{
     render::settings::{RenderSettings, SizeLimits, Splat, SplatSize},
 };
 
-/// The near plane's distance as a part of the farthest distance in the scene. A point nearer than
-/// that has no meaningful place on the picture; reversed floating-point depth spends its precision
-/// evenly over the 30 binary orders of magnitude between.
-const NEAR_OF_FARTHEST: f64 = 1.0 / (1u64 << 30) as f64;
+/// The near plane's distance as a part of the farthest distance in the scene: twelve decimal orders of
+/// magnitude, a hair on the lens and the moon. Reversed floating-point depth spends its precision
+/// evenly over the 40 binary ones.
+const NEAR_OF_FARTHEST: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// A camera made ready for a picture of a certain size.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,8 +14,9 @@ use glam::{DVec2, DVec3};
 
 use super::{Covariance, RANK_TOLERANCE};
 
-/// What the size grows by, so that no point is outside by a rounding.
-const ROUNDING: f64 = 1.0 + 8.0 * f64::EPSILON;
+/// What the size grows by, times the ratio of the axes, so that no point is outside by a rounding: by
+/// as much the direction of the longer axis is off, and that counts against the shorter one.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// An ellipse in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +61,7 @@ impl Ellipse {
             let d = point - middle;
             factor.max((d.dot(long) / a).hypot(d.dot(short) / b))
         });
-        let factor = factor * ROUNDING;
+        let factor = factor * (1.0 + ROUNDING * a / b);
         Self { middle, axes: [long * (factor * a), short * (factor * b)] }
     }
 
@@ -138,7 +139,8 @@ mod tests {
                 return Ok(());
             }
             let farthest = near.iter().map(|&p| reach(&ellipse, p)).fold(0.0, f64::max);
-            prop_assert!((1.0 - 1e-12..=1.0 + 1e-14).contains(&farthest), "{}", farthest);
+            // The slimmest shapes have the most room.
+            prop_assert!((1.0 - 1e-7..=1.0).contains(&farthest), "{}", farthest);
         }
 
         #[test]
@@ -191,6 +193,6 @@ mod tests {
         let near = relative(&line, &covariance);
         let ellipse = Ellipse::bounding(&covariance, covariance.offset, DVec3::Z, near);
         let [long, short] = ellipse.axes.map(DVec3::length);
-        assert!((long - 5000.0).abs() < 1e-8 && short > 0.0 && short < 1e-3, "{long} {short}");
+        assert!((long - 5000.0).abs() < 1e-3 && short > 0.0 && short < 1e-3, "{long} {short}");
     }
 }

@@ -1,0 +1,189 @@
+//! From a file's coordinates to the lattice, and back to world coordinates.
+
+use fastrand::Rng;
+
+use super::Rows;
+use crate::stability::{
+    Row,
+    dataset::{Built, Digits},
+    exact::{Big, apart, big, decimal, whole},
+};
+
+const REFERENCE: &str = "the file's decimals as fractions of 512 bits";
+const ROUNDINGS: &str = "three roundings of a double of that size: the scale, the product, the sum";
+const HALF_A_STEP: &str =
+    "half a lattice step, which the build tells, and the double's own rounding";
+
+pub(super) fn cases() -> Rows {
+    let mut rng = Rng::with_seed(2);
+    let mut around = |middle: i64, reach: i64| -> Vec<[i64; 3]> {
+        (0..500).map(|_| std::array::from_fn(|_| middle + rng.i64(-reach..=reach))).collect()
+    };
+    let mut rows = Vec::new();
+    let exact = [
+        Digits {
+            name: "offset of 10^7 m, 1 mm detail",
+            decimals: 3,
+            points: around(10_000_000_000, 5000),
+        },
+        Digits {
+            name: "earth-centred (ECEF), 1 mm detail",
+            decimals: 3,
+            points: around(0, 5000)
+                .iter()
+                .map(|p| [p[0] + 4_027_881_628, p[1] + 306_998_785, p[2] + 4_919_498_981])
+                .collect(),
+        },
+        Digits {
+            name: "cloud at 10^9 m",
+            decimals: 3,
+            points: around(1_000_000_000_000, 2_000_000),
+        },
+        Digits { name: "scale of 10^-9 m", decimals: 9, points: around(123_456_789, 1_000_000) },
+        Digits { name: "extent of 10^-6 m, ten decimals", decimals: 10, points: around(0, 5000) },
+        Digits { name: "extent of 10^9 m", decimals: 0, points: around(0, 500_000_000) },
+        Digits {
+            name: "last digit of negative coordinates (off by one elsewhere)",
+            decimals: 3,
+            points: around(-123_456, 2000),
+        },
+        Digits { name: "one point", decimals: 3, points: vec![[-1, 10_000_000_001, 0]] },
+    ];
+    for digits in exact {
+        let (found, built) = errors(&digits)?;
+        let (shortcut, truncated) = shortcuts(&digits);
+        let reach = digits.points.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0);
+        let reach = reach as f64 / 10f64.powi(digits.decimals as i32);
+        let roundings = 1.5 * f64::EPSILON * reach;
+        // More than nine decimals are taken for binary numbers, and what that costs is told.
+        let told = built.report.largest_coordinate_error;
+        let tolerance = if told == 0.0 {
+            (roundings, ROUNDINGS)
+        } else {
+            (0.5 * built.report.scale + roundings, HALF_A_STEP)
+        };
+        rows.push(
+            Row::new(digits.name, (found, "m"), tolerance, REFERENCE)
+                .beside("single precision", shortcut)
+                .beside("truncated steps", truncated),
+        );
+    }
+    rows.push(too_wide(&mut rng)?);
+    rows.push(doubles(&mut rng)?);
+    rows.extend(dropped()?);
+    Ok(rows)
+}
+
+/// Largest error of a coordinate; infinite where points are missing.
+fn errors(digits: &Digits) -> Result<(f64, Built), crate::stability::StabilityError> {
+    let built = Built::of("case.xyz", digits.text().as_bytes(), 8)?;
+    let points = built.points()?;
+    if points.len() != digits.points.len() {
+        return Ok((f64::INFINITY, built));
+    }
+    let lattice = built.dataset.manifest().lattice;
+    let error = points.iter().flat_map(|point| {
+        let exact = digits.exact(point.number);
+        lattice.world(point.q).into_iter().zip(exact).map(|(found, exact)| apart(found, &exact))
+    });
+    Ok((error.fold(0.0, f64::max), built))
+}
+
+/// Largest errors of coordinates kept in single precision, and of steps cut off instead of rounded.
+fn shortcuts(digits: &Digits) -> (f64, f64) {
+    let scale = 10f64.powi(-(digits.decimals as i32));
+    let world: Vec<[f64; 3]> = digits.points.iter().map(|p| p.map(|c| c as f64 * scale)).collect();
+    let least: [f64; 3] =
+        std::array::from_fn(|a| world.iter().map(|p| p[a]).fold(f64::INFINITY, f64::min));
+    let (mut single, mut cut) = (0.0f64, 0.0f64);
+    for (i, p) in world.iter().enumerate() {
+        for (a, exact) in digits.exact(i).iter().enumerate() {
+            single = single.max(apart(f64::from(p[a] as f32), exact));
+            let steps = ((p[a] - least[a]) / scale) as i64;
+            cut = cut.max(apart(least[a] + steps as f64 * scale, exact));
+        }
+    }
+    (single, cut)
+}
+
+/// More digits than a lattice has steps: rounded, and told.
+fn too_wide(rng: &mut Rng) -> Result<Row, crate::stability::StabilityError> {
+    let reach = 500_000_000_000i64;
+    let points = (0..500).map(|_| std::array::from_fn(|_| rng.i64(-reach..=reach))).collect();
+    let name = "extent of 10^9 m, 1 mm detail (more than 2^32 steps)";
+    let digits = Digits { name, decimals: 3, points };
+    let (found, built) = errors(&digits)?;
+    let (single, _) = shortcuts(&digits);
+    let tolerance = 0.5 * built.report.scale + 4.0 * f64::EPSILON * 5e8;
+    Ok(Row::new(name, (found, "m"), (tolerance, HALF_A_STEP), REFERENCE)
+        .beside("single precision", single))
+}
+
+/// Binary numbers, which no decimal lattice holds.
+fn doubles(rng: &mut Rng) -> Result<Row, crate::stability::StabilityError> {
+    let points: Vec<[f64; 3]> =
+        (0..500).map(|_| std::array::from_fn(|_| 1e7 + 2.0 * rng.f64())).collect();
+    let mut bytes = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double \
+         y\nproperty double z\nproperty uint number\nend_header\n",
+        points.len()
+    )
+    .into_bytes();
+    for (i, p) in (0u32..).zip(&points) {
+        p.iter().for_each(|c| bytes.extend(c.to_le_bytes()));
+        bytes.extend(i.to_le_bytes());
+    }
+    let built = Built::of("case.ply", &bytes, 8)?;
+    let lattice = built.dataset.manifest().lattice;
+    let found = built.points()?;
+    let error = found.iter().flat_map(|point| {
+        let exact: [Big; 3] = points[point.number].map(big);
+        lattice.world(point.q).into_iter().zip(exact).map(|(found, exact)| apart(found, &exact))
+    });
+    let error = error.fold(0.0, f64::max);
+    let error = if found.len() == points.len() { error } else { f64::INFINITY };
+    let single = points.iter().flatten().map(|&c| apart(f64::from(c as f32), &big(c)));
+    let tolerance = 0.5 * lattice.scale + 1.5 * f64::EPSILON * 1e7;
+    Ok(Row::new(
+        "binary doubles at 10^7 m",
+        (error, "m"),
+        (tolerance, HALF_A_STEP),
+        "the file's doubles",
+    )
+    .beside("single precision", single.fold(0.0, f64::max)))
+}
+
+/// What is no coordinate, and nothing at all.
+fn dropped() -> Rows {
+    let text = "0.5 1.5 2.5 0\nnan 1 2 1\n1 inf 2 2\n1 2 -inf 3\n-0.5 -1.5 -2.5 4\n";
+    let built = Built::of("case.xyz", text.as_bytes(), 8)?;
+    let told: u64 = built.report.dropped.iter().map(|dropped| dropped.points).sum();
+    let lattice = built.dataset.manifest().lattice;
+    let mut kept = built.points()?;
+    kept.sort_by_key(|point| point.number);
+    let kept: Vec<_> = kept.iter().map(|point| lattice.world(point.q)).collect();
+    let expected = ["0.5", "1.5", "2.5", "-0.5", "-1.5", "-2.5"].map(decimal);
+    let is_same = kept.len() == 2
+        && kept
+            .iter()
+            .flatten()
+            .zip(&expected)
+            .all(|(&found, exact)| apart(found, exact) == 0.0 && *exact != whole(0));
+    let nan = Row::holds(
+        "NaN and infinite coordinates",
+        told == 3 && is_same,
+        "the three bad points are left out and counted, the two good ones kept",
+        "the lines of the file",
+    );
+    let empty = Built::of("case.ply", EMPTY_PLY.as_bytes(), 8);
+    let none = Row::holds(
+        "no point",
+        empty.is_err_and(|e| e.to_string().contains("no points")),
+        "there is nothing to build, and that is what is said",
+        "nothing",
+    );
+    Ok(vec![nan, none])
+}
+
+const EMPTY_PLY: &str = "ply\nformat ascii 1.0\nelement vertex 0\nproperty double x\nproperty double \
+                         y\nproperty double z\nend_header\n";
