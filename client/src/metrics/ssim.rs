@@ -7,8 +7,8 @@
 //!
 //! In f64 throughout: in f32 the variance of a bright, flat window, a difference of squares, would
 //! be off by up to 0.01, which beside C2 = 58.5 is far more than the 1e-6 that is promised. The
-//! Gaussian is separable and symmetric, and formula (13) asks only for the sum of the two variances: four moments
-//! are filtered, six multiplications each way.
+//! Gaussian is separable and symmetric, and formula (13) asks only for the sum of the two variances:
+//! four moments are filtered, with six multiplications each way.
 
 use rayon::prelude::*;
 
