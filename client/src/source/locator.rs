@@ -57,6 +57,7 @@ mod tests {
         match parse(text).expect(text) {
             Source::Http(source) => source.url().to_string(),
             Source::File(source) => source.path().display().to_string(),
+            Source::Linked(source) => source.describe(),
         }
     }
 
