@@ -76,8 +76,8 @@ impl Progress for Quiet {
 }
 
 impl Built {
-    /// Builds the file `name` of these bytes, whose points have `x`, `y`, `z` and `number`, with
-    /// `grid` cells a node's side.
+    /// Builds the file `name` of these bytes, whose points have `x`, `y`, `z` and `number` (in LAS:
+    /// `point_source_id`), with `grid` cells a node's side.
     pub fn of(name: &str, bytes: &[u8], grid: u32) -> Result<Self, StabilityError> {
         let failed = |path: PathBuf| {
             move |e: std::io::Error| StabilityError::File { path, why: e.to_string() }
@@ -106,7 +106,9 @@ impl Built {
     /// All points, in no promised order.
     pub fn points(&self) -> Result<Vec<Placed>, StabilityError> {
         let manifest = self.dataset.manifest();
-        let number = manifest.attributes.iter().position(|a| a.name == "number");
+        // LAS has no field of that name; this one is free.
+        let is_number = |name: &str| name == "number" || name == "point_source_id";
+        let number = manifest.attributes.iter().position(|a| is_number(&a.name));
         let groups: Vec<usize> = (0..manifest.groups.len()).collect();
         let mut placed = Vec::new();
         for node in self.dataset.hierarchy()? {

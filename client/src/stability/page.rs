@@ -65,8 +65,8 @@ fn title(name: &str) -> String {
 /// Where shortcuts fail while ours hold: of every algorithm the plainest.
 fn contrasts(table: &Table) -> Section {
     let mut shown = PageTable::new(&[
-        ("algorithm", Align::Word),
         ("case", Align::Text),
+        ("algorithm", Align::Word),
         ("here", Align::Number),
         ("shortcut", Align::Text),
         ("its error", Align::Number),
@@ -87,8 +87,8 @@ fn contrasts(table: &Table) -> Section {
         failing.retain(|(row, _)| seen.insert(row.case.as_str()));
         for (row, naive) in failing.into_iter().take(CONTRASTS_EACH) {
             shown.rows.push(vec![
-                algorithm.name.into(),
                 Cell::Markup(powers(&row.case)),
+                algorithm.name.into(),
                 Cell::Markup(figure(row.error)),
                 naive.name.into(),
                 Cell::Markup(html! { span.bad-number { (figure(naive.error)) } }),
@@ -294,7 +294,7 @@ mod tests {
         let table = Table { rows: vec![held, missed] };
         let html = page(&table, "lodestream stability -o DIR".into(), Vec::new()).render();
         assert_eq!(powers("10^-6 : 1").into_string(), "10<sup>\u{2212}6</sup> : 1");
-        assert_eq!(figure(1.25e-9).into_string(), "1.2 · 10<sup>\u{2212}9</sup>");
+        assert_eq!(figure(1.2e-9).into_string(), "1.2 · 10<sup>\u{2212}9</sup>");
         let place = |text: &str| html.find(text).unwrap_or_else(|| panic!("{text} in {html}"));
         assert!(place("id=\"missed\"") < place("id=\"overview\""));
         assert!(place("id=\"overview\"") < place("id=\"contrasts\""));

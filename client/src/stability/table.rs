@@ -143,14 +143,16 @@ fn size(error: f64) -> f64 {
     if error.is_nan() { f64::INFINITY } else { error }
 }
 
-/// Two digits.
+/// Two digits, or all of a whole number.
 pub(super) fn short(value: f64) -> String {
-    if value == 0.0 {
-        "0".into()
-    } else if !value.is_finite() {
+    let size = value.abs();
+    if !value.is_finite() {
         "none".into()
-    } else if value.fract() == 0.0 && value.abs() < 1e6 {
+    } else if value.fract() == 0.0 && size < 1e6 {
         format!("{value}")
+    } else if (0.01..100.0).contains(&size) {
+        let decimals = (1.0 - size.log10().floor()).max(0.0) as usize;
+        format!("{value:.decimals$}")
     } else {
         format!("{value:.1e}")
     }
@@ -192,7 +194,7 @@ mod tests {
 
     #[test]
     fn numbers_are_short() {
-        let shorts = [0.0, 1.0, 1234.0, 1.24e-16, f64::NAN, 0.5].map(short);
-        assert_eq!(shorts, ["0", "1", "1234", "1.2e-16", "none", "5.0e-1"]);
+        let shorts = [0.0, 1.0, 1234.0, 1.24e-16, f64::NAN, 0.512, 3.44, 44.4, 0.0351].map(short);
+        assert_eq!(shorts, ["0", "1", "1234", "1.2e-16", "none", "0.51", "3.4", "44", "0.035"]);
     }
 }

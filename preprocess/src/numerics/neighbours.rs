@@ -4,8 +4,8 @@
 //! order what is consecutive is near. The tree is as deep as the number of points says, whatever
 //! these are, so a million duplicates, one far outlier, or spacings 10^8 apart within one cloud cost
 //! nothing; grids and trees that split space have cases for each of these. Distances are integers:
-//! exact, and the same on every machine. (The `kiddo` crate, which splits space, needs a float copy of
-//! the points, and takes as many equal coordinates as fit into one of its buckets.)
+//! exact, and the same on every machine. (The `kiddo` crate would have to be given floats: a copy of
+//! the points, and rounded distances.)
 //!
 //! Sums over points are exact and merge, so boxes that lie wholly within a radius are taken whole.
 

@@ -1,10 +1,14 @@
 //! From a file's coordinates to the lattice, and back to world coordinates.
 
+use std::path::Path;
+
 use fastrand::Rng;
+use lodestream_preprocess::writers::{self, ExportBlock, ExportInfo};
+use lodestream_protocol::{Attribute, Column, Domain, Lattice, LatticeBox, ScalarType, Storage};
 
 use super::Rows;
 use crate::stability::{
-    Row,
+    Row, StabilityError,
     dataset::{Built, Digits},
     exact::{Big, apart, big, decimal, whole},
 };
@@ -70,12 +74,68 @@ pub(super) fn cases() -> Rows {
     }
     rows.push(too_wide(&mut rng)?);
     rows.push(doubles(&mut rng)?);
+    rows.push(las(&mut rng)?);
     rows.extend(dropped()?);
     Ok(rows)
 }
 
+/// Integers of a LAS file on both sides of zero, with an offset that is no whole number of steps.
+fn las(rng: &mut Rng) -> Result<Row, StabilityError> {
+    const OFFSET: &str = "-4027881.6285";
+    const ORIGIN: i64 = -1000;
+    let offset = OFFSET.parse().unwrap_or(f64::NAN);
+    let lattice = Lattice { scale: 0.001, offset: [offset; 3], origin: [ORIGIN; 3], side_bits: 11 };
+    let positions: Vec<[u32; 3]> =
+        (0..500).map(|_| std::array::from_fn(|_| rng.u32(..2000))).collect();
+    let attribute = Attribute {
+        name: "point_source_id".into(),
+        scalar: ScalarType::U16,
+        components: 1,
+        domain: Domain::Element,
+        storage: Storage::Column { group: 0 },
+        min: vec![0.0],
+        max: vec![499.0],
+    };
+    let bounds = LatticeBox { min: [0; 3], max: [1999; 3] };
+    let info = ExportInfo { lattice, bounds, points: 500, attributes: vec![attribute], crs: None };
+    let numbers = Column { attribute: 0, bytes: (0..500u16).flat_map(u16::to_le_bytes).collect() };
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |e: std::io::Error| StabilityError::File { path, why: e.to_string() }
+    };
+    let folder = tempfile::tempdir().map_err(failed(&std::env::temp_dir()))?;
+    let path = folder.path().join("case.las");
+    let mut writer = writers::create(&path, info)?;
+    writer.write(&ExportBlock { positions: positions.clone(), columns: vec![numbers] })?;
+    writer.finish()?;
+    let bytes = std::fs::read(&path).map_err(failed(&path))?;
+    let built = Built::of("case.las", &bytes, 8)?;
+    let found = built.points()?;
+    let lattice = built.dataset.manifest().lattice;
+    let (mut error, mut single, mut cut) = (0.0f64, 0.0f64, 0.0f64);
+    for point in &found {
+        let world = lattice.world(point.q);
+        for a in 0..3 {
+            let steps = ORIGIN + i64::from(positions[point.number][a]);
+            let exact = decimal(OFFSET) + whole(steps.into()) / whole(1000);
+            error = error.max(apart(world[a], &exact));
+            single = single.max(apart(f64::from(world[a] as f32), &exact));
+            // From the lowest coordinate, cut off to whole steps.
+            let low = offset + ORIGIN as f64 * 0.001;
+            let steps = ((offset + steps as f64 * 0.001 - low) / 0.001) as i64;
+            cut = cut.max(apart(low + steps as f64 * 0.001, &exact));
+        }
+    }
+    let error = if found.len() == positions.len() { error } else { f64::INFINITY };
+    let tolerance = 1.5 * f64::EPSILON * 4_027_882.0;
+    let case = "LAS integers of both signs, offset of half a step";
+    Ok(Row::new(case, (error, "m"), (tolerance, ROUNDINGS), REFERENCE)
+        .beside("single precision", single)
+        .beside("truncated steps", cut))
+}
+
 /// Largest error of a coordinate; infinite where points are missing.
-fn errors(digits: &Digits) -> Result<(f64, Built), crate::stability::StabilityError> {
+fn errors(digits: &Digits) -> Result<(f64, Built), StabilityError> {
     let built = Built::of("case.xyz", digits.text().as_bytes(), 8)?;
     let points = built.points()?;
     if points.len() != digits.points.len() {
@@ -107,7 +167,7 @@ fn shortcuts(digits: &Digits) -> (f64, f64) {
 }
 
 /// More digits than a lattice has steps: rounded, and told.
-fn too_wide(rng: &mut Rng) -> Result<Row, crate::stability::StabilityError> {
+fn too_wide(rng: &mut Rng) -> Result<Row, StabilityError> {
     let reach = 500_000_000_000i64;
     let points = (0..500).map(|_| std::array::from_fn(|_| rng.i64(-reach..=reach))).collect();
     let name = "extent of 10^9 m, 1 mm detail (more than 2^32 steps)";
@@ -120,7 +180,7 @@ fn too_wide(rng: &mut Rng) -> Result<Row, crate::stability::StabilityError> {
 }
 
 /// Binary numbers, which no decimal lattice holds.
-fn doubles(rng: &mut Rng) -> Result<Row, crate::stability::StabilityError> {
+fn doubles(rng: &mut Rng) -> Result<Row, StabilityError> {
     let points: Vec<[f64; 3]> =
         (0..500).map(|_| std::array::from_fn(|_| 1e7 + 2.0 * rng.f64())).collect();
     let mut bytes = format!(
