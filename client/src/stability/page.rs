@@ -1,14 +1,14 @@
 //! The table as a page.
 
-use std::{collections::HashSet, fmt::Write};
+use std::fmt::Write;
 
 use maud::{Markup, PreEscaped, html};
 
-use super::{ALGORITHMS, Algorithm, Row, Table, table::short};
+use super::{ALGORITHMS, Algorithm, Naive, Row, Table, table::short};
 use crate::report::{Align, Cell, Page, Section, Table as PageTable, Tone};
 
 /// Contrasts that the first section shows: the plainest of every algorithm.
-const CONTRASTS_EACH: usize = 3;
+const CONTRASTS_EACH: usize = 4;
 
 /// The page; `command` makes it again, `facts` are what it hangs on.
 #[must_use]
@@ -82,10 +82,7 @@ fn contrasts(table: &Table) -> Section {
         failing.sort_by(|(a, x), (b, y)| {
             beyond(y.error, b.tolerance).total_cmp(&beyond(x.error, a.tolerance))
         });
-        // A case each.
-        let mut seen = HashSet::new();
-        failing.retain(|(row, _)| seen.insert(row.case.as_str()));
-        for (row, naive) in failing.into_iter().take(CONTRASTS_EACH) {
+        for (row, naive) in plainest(&failing) {
             shown.rows.push(vec![
                 Cell::Markup(powers(&row.case)),
                 algorithm.name.into(),
@@ -104,6 +101,21 @@ fn contrasts(table: &Table) -> Section {
             .into(),
         body: shown.markup(),
     }
+}
+
+/// Some of those that fail, worst first: each of another case, and each shortcut once before any twice.
+fn plainest<'a>(failing: &[(&'a Row, &'a Naive)]) -> Vec<(&'a Row, &'a Naive)> {
+    let mut chosen: Vec<(&Row, &Naive)> = Vec::new();
+    for may_repeat in [false, true] {
+        for &(row, naive) in failing {
+            let is_new = chosen.iter().all(|(other, _)| other.case != row.case);
+            let repeats = chosen.iter().any(|(_, other)| other.name == naive.name);
+            if chosen.len() < CONTRASTS_EACH && is_new && (may_repeat || !repeats) {
+                chosen.push((row, naive));
+            }
+        }
+    }
+    chosen
 }
 
 fn rows<'a>(rows: impl Iterator<Item = &'a Row>) -> Markup {
@@ -148,28 +160,31 @@ fn shortcuts(row: &Row) -> Markup {
     }
 }
 
-/// A number in two digits, its power of ten raised.
+/// A number in two digits, its power of ten raised; `none` where it is no number.
 fn figure(value: f64) -> Markup {
     let text = short(value);
-    match text.split_once('e') {
-        Some((digits, power)) => {
-            html! { (digits) " · 10" sup { (power.replace('-', "\u{2212}")) } }
-        }
+    match text.split_once('e').filter(|_| value.is_finite()) {
+        Some((digits, power)) => html! { (digits) " · 10" sup { (minus(power)) } },
         None => html! { (text) },
     }
 }
 
-/// A case's name, its powers of ten raised.
+/// A case's name, its powers raised.
 fn powers(name: &str) -> Markup {
-    let mut parts = name.split("10^");
+    let mut parts = name.split('^');
     let first = parts.next().unwrap_or_default();
     html! {
         (first)
         @for part in parts {
             @let end = part.find(|c: char| !(c == '-' || c.is_ascii_digit())).unwrap_or(part.len());
-            "10" sup { (part[..end].replace('-', "\u{2212}")) } (part[end..])
+            sup { (minus(&part[..end])) } (part[end..])
         }
     }
+}
+
+/// With the sign that figures have.
+fn minus(power: &str) -> String {
+    power.replace('-', "\u{2212}")
 }
 
 /// Decades of error, in tolerances, that the drawing shows.
@@ -294,6 +309,7 @@ mod tests {
         let table = Table { rows: vec![held, missed] };
         let html = page(&table, "lodestream stability -o DIR".into(), Vec::new()).render();
         assert_eq!(powers("10^-6 : 1").into_string(), "10<sup>\u{2212}6</sup> : 1");
+        assert_eq!(figure(f64::NAN).into_string(), "none");
         assert_eq!(figure(1.2e-9).into_string(), "1.2 · 10<sup>\u{2212}9</sup>");
         let place = |text: &str| html.find(text).unwrap_or_else(|| panic!("{text} in {html}"));
         assert!(place("id=\"missed\"") < place("id=\"overview\""));
