@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod commands;
 pub mod engine;
+pub mod eval;
 pub mod metrics;
 pub mod path;
 pub mod render;

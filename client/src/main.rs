@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use lodestream_client::{
-    commands::{demo, export, shot, stability},
+    commands::{demo, eval, export, shot, stability},
     source::{BlockingSource, Source},
 };
 use lodestream_server::commands::{build, finish, inspect, serve, verify};
@@ -26,6 +26,7 @@ enum Command {
     Export(export::ExportArgs),
     Shot(shot::ShotArgs),
     Demo(demo::DemoArgs),
+    Eval(eval::EvalArgs),
     Stability(stability::StabilityArgs),
 }
 
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         Command::Export(args) => export::run(args),
         Command::Shot(args) => shot::run(args),
         Command::Demo(args) => demo::run(args),
+        Command::Eval(args) => eval::run(args),
         Command::Stability(args) => stability::run(args),
     })
 }

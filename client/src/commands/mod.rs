@@ -2,6 +2,7 @@
 
 pub mod appearance;
 pub mod demo;
+pub mod eval;
 pub mod export;
 pub mod shot;
 pub mod stability;

@@ -31,6 +31,7 @@ const HYSTERESIS: f64 = 1.1;
 pub(super) struct Limits {
     pub point_budget: u64,
     pub min_size_px: f64,
+    pub culls_outside: bool,
 }
 
 /// A wanted node.
@@ -336,11 +337,15 @@ impl Walk<'_> {
         }
     }
 
+    fn is_outside(&self, bounds: &WorldBox) -> bool {
+        self.limits.culls_outside && self.optics.is_outside(bounds)
+    }
+
     fn look(&self, cloud: usize, node: &Node) -> Sight {
         let Some(tree) = &self.trees[cloud] else { return Sight::Outside };
         let lattice = &tree.boot().manifest.lattice;
         let bounds = WorldBox::of(&node.bounds, lattice);
-        if self.optics.is_outside(&bounds) {
+        if self.is_outside(&bounds) {
             return Sight::Outside;
         }
         let bonus =
@@ -378,7 +383,7 @@ impl Walk<'_> {
             let octant = WorldBox::of(&octant, lattice);
             let cube = cube_radius(lattice.node_side_world(key.level()));
             let largest = HYSTERESIS * self.optics.largest_projected_size(&octant, cube);
-            !self.optics.is_outside(&octant) && largest >= self.limits.min_size_px
+            !self.is_outside(&octant) && largest >= self.limits.min_size_px
         })
     }
 }
@@ -546,7 +551,7 @@ mod tests {
         ) {
             let forest = Forest::new(seed, refinement);
             let (optics, none) = (optics(eye, target, fov_y), HashSet::new());
-            let limits = Limits { point_budget, min_size_px };
+            let limits = Limits { point_budget, min_size_px, culls_outside: true };
             let whole = select(&mut forest.tree(forest.pages.keys()), &optics, limits, &none);
             prop_assert!(whole.pages.is_empty());
             // Some pages are there already, from an earlier view.
@@ -573,7 +578,7 @@ mod tests {
             fov_y in 0.1..3.1, point_budget in 0u64..50_000,
         ) {
             let forest = Forest::new(seed, refinement);
-            let limits = Limits { point_budget, min_size_px: 1.0 };
+            let limits = Limits { point_budget, min_size_px: 1.0, culls_outside: true };
             let mut trees = forest.tree(forest.pages.keys());
             let selection = select(&mut trees, &optics(eye, target, fov_y), limits, &HashSet::new());
             prop_assert!(selection.points <= point_budget);
@@ -604,7 +609,7 @@ mod tests {
         let forest = Forest::new(SEED, Refinement::Additive);
         let mut trees = forest.tree(forest.pages.keys());
         let mut swing = |point_budget, remember: bool| {
-            let limits = Limits { point_budget, min_size_px: 20.0 };
+            let limits = Limits { point_budget, min_size_px: 20.0, culls_outside: true };
             let mut selections: Vec<HashSet<NodeId>> = vec![HashSet::new()];
             for step in 0..6 {
                 let eye = [128.0 + 4.0 * f64::from(step % 2), -400.0, 128.0];
@@ -627,7 +632,7 @@ mod tests {
         huge.root_page.nodes[0].points = 1_000_000;
         let mut trees = forest.tree(forest.pages.keys());
         trees.insert(0, Some(Tree::new(Arc::new(huge))));
-        let limits = Limits { point_budget: 8000, min_size_px: 20.0 };
+        let limits = Limits { point_budget: 8000, min_size_px: 20.0, culls_outside: true };
         let optics = optics([128.0, -400.0, 128.0], [128.0; 3], 1.0);
         let selection = select(&mut trees, &optics, limits, &HashSet::new());
         assert!(!selection.picks.is_empty());
@@ -637,7 +642,7 @@ mod tests {
     #[test]
     fn the_tree_of_these_tests_is_large() {
         let forest = Forest::new(SEED, Refinement::Additive);
-        let limits = Limits { point_budget: u64::MAX, min_size_px: 0.0 };
+        let limits = Limits { point_budget: u64::MAX, min_size_px: 0.0, culls_outside: true };
         let optics = optics([128.0, -400.0, 128.0], [128.0; 3], 1.0);
         let mut trees = forest.tree(forest.pages.keys());
         assert!(select(&mut trees, &optics, limits, &HashSet::new()).picks.len() > 50);
@@ -651,7 +656,7 @@ mod tests {
         boot.root_page.nodes[0].child_mask = 0;
         boot.root_page.nodes[0].bounds = LatticeBox { min: [7; 3], max: [7; 3] };
         forest.boot = Arc::new(boot);
-        let limits = Limits { point_budget: 8000, min_size_px: 50.0 };
+        let limits = Limits { point_budget: 8000, min_size_px: 50.0, culls_outside: true };
         let optics = optics([0.0, -1e6, 0.0], [7.0; 3], 1.0);
         let selection = select(&mut forest.tree([]), &optics, limits, &HashSet::new());
         assert_eq!(keys(&selection), [NodeKey::ROOT]);

@@ -53,7 +53,11 @@ impl Traversal {
     pub fn new(shared: Arc<Shared>, config: &EngineConfig, clouds: usize) -> Self {
         Self {
             shared,
-            limits: Limits { point_budget: config.point_budget, min_size_px: config.min_size_px },
+            limits: Limits {
+                point_budget: config.point_budget,
+                min_size_px: config.min_size_px,
+                culls_outside: config.culls_outside,
+            },
             attributes: config.attributes.clone(),
             clouds: vec![Cloud::default(); clouds],
             trees: (0..clouds).map(|_| None).collect(),

@@ -33,7 +33,7 @@ use serde::Serialize;
 pub use color::Coloring;
 pub use cpu::{CpuRenderer, TruthRenderer};
 pub use density::PointsPerPixel;
-pub use gpu::{GpuConfig, GpuPath, GpuRenderer};
+pub use gpu::{GpuConfig, GpuPath, GpuRenderer, shader_bytes};
 pub use picture::Picture;
 pub use renderer::Renderer;
 pub use scene::Scene;

@@ -23,7 +23,6 @@ use std::time::Instant;
 
 use lodestream_shaders::Pixels;
 
-pub use self::config::{GpuConfig, GpuPath};
 use self::{
     choice::{Choice, Kind},
     device::Device,
@@ -33,6 +32,10 @@ use self::{
     plan::Plan,
     pool::Pool,
     target::{Target, pixel_count},
+};
+pub use self::{
+    config::{GpuConfig, GpuPath},
+    pipelines::shader_bytes,
 };
 use crate::render::{
     ColorMode, Frame, FrameStatistics, PointsPerPixel, RenderError, RenderSettings, Scene,

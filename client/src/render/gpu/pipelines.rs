@@ -2,9 +2,13 @@
 
 use std::collections::{HashMap, hash_map::Entry};
 
-use lodestream_shaders::{Blending, Footprint, Mesh, Phong, Pixels, Splatting};
+use lodestream_protocol::Manifest;
+use lodestream_shaders::{
+    Blending, ColorSource, Footprint, Mesh, Phong, Pixels, ShapeField, SizeSource, Splatting,
+};
 
-use crate::render::settings::phong;
+use super::plan::splatting;
+use crate::render::{Coloring, RenderSettings, settings::phong};
 
 /// Colours as they are coded, so that a byte in is the same byte out.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -373,4 +377,27 @@ fn make_indices(device: &wgpu::Device, footprint: Footprint) -> Option<Indices> 
     }
     buffer.unmap();
     Some(Indices { buffer, count: indices.len() as u32 })
+}
+
+/// Bytes of WGSL that draw a cloud by the rasteriser, and that would draw one that has and shows
+/// everything.
+pub fn shader_bytes(settings: &RenderSettings, cloud: &Manifest) -> [u64; 2] {
+    let color = match Coloring::of(settings.color, cloud) {
+        Coloring::Rgb { .. } => ColorSource::Rgb,
+        Coloring::Intensity { .. } => ColorSource::Intensity,
+        Coloring::Classification { .. } => ColorSource::Class,
+        Coloring::Normal => ColorSource::Normal,
+        Coloring::Elevation => ColorSource::Elevation,
+        Coloring::Level | Coloring::Density | Coloring::Constant(_) => ColorSource::Node,
+    };
+    let needed = splatting(settings, cloud, color);
+    let everything = Splatting {
+        color: ColorSource::Intensity,
+        size: SizeSource::Adaptive,
+        normals: true,
+        shape: ShapeField::Axes,
+        phong: true,
+        ..needed
+    };
+    [needed, everything].map(|way| way.raster(Blending::Nearest, &LIGHT).len() as u64)
 }

@@ -2,6 +2,7 @@
 //! are drawn with one call each.
 
 use glam::Vec3;
+use lodestream_protocol::Manifest;
 use lodestream_shaders::{CHUNK_POINTS, ColorSource, ShapeField, SizeSource, Splatting};
 
 use super::{
@@ -87,26 +88,29 @@ impl Frame<'_> {
             NodeColor::Elevation { .. } => ColorSource::Elevation,
             NodeColor::Constant(_) => ColorSource::Node,
         };
-        let parts = SurfaceParts::of(self.settings, &self.scene.clouds[cloud]);
-        let shape = match parts {
-            SurfaceParts { axes: true, .. } => ShapeField::Axes,
-            SurfaceParts { radii: true, .. } => ShapeField::Radius,
-            _ => ShapeField::None,
-        };
-        let counted = self.settings.color == ColorMode::Density;
-        let footprint = if counted { Splat::Point } else { self.settings.splat }.footprint();
-        let size = match (self.settings.splat_size, shape) {
-            // A point has no size to look up.
-            _ if footprint == Splat::Point.footprint() => SizeSource::Node,
-            (SplatSize::Own, ShapeField::None) | (SplatSize::Adaptive(_), _) => {
-                SizeSource::Adaptive
-            }
-            (SplatSize::Own, _) => SizeSource::Record,
-            _ => SizeSource::Node,
-        };
-        let phong = self.settings.shading.phong && !counted;
-        Splatting { footprint, color, size, normals: parts.normals, shape, phong }
+        splatting(self.settings, &self.scene.clouds[cloud], color)
     }
+}
+
+/// How a cloud is drawn whose colours come from `color`.
+pub fn splatting(settings: &RenderSettings, cloud: &Manifest, color: ColorSource) -> Splatting {
+    let parts = SurfaceParts::of(settings, cloud);
+    let shape = match parts {
+        SurfaceParts { axes: true, .. } => ShapeField::Axes,
+        SurfaceParts { radii: true, .. } => ShapeField::Radius,
+        _ => ShapeField::None,
+    };
+    let counted = settings.color == ColorMode::Density;
+    let footprint = if counted { Splat::Point } else { settings.splat }.footprint();
+    let size = match (settings.splat_size, shape) {
+        // A point has no size to look up.
+        _ if footprint == Splat::Point.footprint() => SizeSource::Node,
+        (SplatSize::Own, ShapeField::None) | (SplatSize::Adaptive(_), _) => SizeSource::Adaptive,
+        (SplatSize::Own, _) => SizeSource::Record,
+        _ => SizeSource::Node,
+    };
+    let phong = settings.shading.phong && !counted;
+    Splatting { footprint, color, size, normals: parts.normals, shape, phong }
 }
 
 impl Plan {

@@ -1,0 +1,32 @@
+//! Error against run time: every method, budget and policy is a point on a curve.
+//!
+//! - `views.rs`: where pictures are taken from, by rule;
+//! - `subject.rs`: a dataset and the truth of any view of it;
+//! - `frame.rs`: milliseconds per frame and error;
+//! - `stream.rs`: error over time while a view streams in;
+//! - `left_out.rs`: what a view does without, and what that saves;
+//! - `curve.rs`: areas under curves, times to a quality, bytes at equal error, Pareto fronts;
+//! - `run.rs`: all of it, for `lodestream eval`;
+//! - `report.rs`, `page.rs`: what was found, for programs and for people; `compare.rs`: two of them.
+
+mod compare;
+mod curve;
+mod frame;
+mod left_out;
+mod page;
+mod report;
+mod run;
+mod stream;
+mod subject;
+mod views;
+
+pub use compare::{Difference, compare};
+pub use curve::{Reached, Sample, area, bytes_at_equal_error, pareto, reached};
+pub use frame::FrameRow;
+pub use left_out::{Cost, NotStored, SavingRow};
+pub use page::page;
+pub use report::{BuildRow, Entrant, NoiseRow, Race, Report, SubjectReport};
+pub use run::{EvalConfig, Exhibit, run};
+pub use stream::{LEVELS, Stop, StreamRun, Streaming};
+pub use subject::Subject;
+pub use views::ViewSize;

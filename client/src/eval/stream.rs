@@ -1,0 +1,204 @@
+//! Error over time while a view streams in: from a cold start and after jumps, per link and policy.
+//!
+//! The engine is the product's own in simulated time on a made-up link: the errors of a run are the
+//! same to the last digit each time, and its times are those of the network alone.
+
+use std::{
+    collections::HashMap,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    curve::{self, Reached, Sample},
+    subject::Subject,
+};
+use crate::{
+    camera::Camera,
+    engine::{EngineConfig, FramePlan, Policy, SimulatedEngine, View},
+    metrics::PictureError,
+    render::{Picture, RenderSettings, TruthRenderer, VisibleTree},
+    source::{Link, LinkSpec, Source},
+};
+
+/// Levels of similarity whose times are told.
+pub const LEVELS: [f64; 3] = [0.9, 0.95, 0.98];
+
+/// A view that is looked at until it is complete.
+#[derive(Debug, Clone)]
+pub struct Stop {
+    /// As reports name it.
+    pub name: String,
+    /// From where.
+    pub camera: Camera,
+}
+
+/// How a view came in.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StreamRun {
+    /// The view.
+    pub view: String,
+    /// What was there before: `cold`, or the view that was jumped from.
+    pub from: String,
+    /// The link, as it is written.
+    pub link: String,
+    /// The policy.
+    pub policy: Policy,
+    /// Simulated milliseconds until nothing more was to come; `None` where that did not happen in
+    /// time.
+    pub settled_ms: Option<f64>,
+    /// Bytes received.
+    pub bytes: u64,
+    /// Requests sent.
+    pub requests: u64,
+    /// Points of the complete picture.
+    pub points: u64,
+    /// Similarity of the complete picture.
+    pub ssim: f64,
+    /// When each of [`LEVELS`] was reached, for good.
+    pub reached: Vec<Option<Reached>>,
+    /// Least milliseconds for the bytes that the complete picture took: two round trips and their
+    /// transmission.
+    pub bound_ms: f64,
+    /// At the steps at which the picture changed.
+    pub samples: Vec<Sample>,
+}
+
+/// How views are streamed in.
+pub struct Streaming<'a> {
+    /// The dataset.
+    pub subject: &'a Subject,
+    /// Of the pictures; cameras are put in.
+    pub settings: RenderSettings,
+    /// For [`Policy::Ours`]; what the others need is changed.
+    pub config: EngineConfig,
+    /// Between two looks.
+    pub step: Duration,
+    /// Simulated time after which a run is given up.
+    pub patience: Duration,
+    /// Of the link's losses, and of where the samples of pixels lie.
+    pub seed: u64,
+    /// Along each side of a pixel, as of the truths.
+    pub samples: u32,
+    /// Asked for between two steps.
+    pub cancel: &'a AtomicBool,
+}
+
+impl Streaming<'_> {
+    /// Streams the stops in, one after the other, from a cold start.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, a picture cannot be drawn, or `cancel` is set.
+    pub fn run(
+        &self,
+        stops: &[Stop],
+        truths: &HashMap<String, Picture>,
+        link: LinkSpec,
+        policy: Policy,
+    ) -> anyhow::Result<Vec<StreamRun>> {
+        let source = Source::linked(self.subject.file()?, Link::new(link, self.seed));
+        let config = policy.apply(self.config.clone());
+        let mut engine = SimulatedEngine::start(vec![source], config)?;
+        let mut from = "cold".to_owned();
+        let mut runs = Vec::new();
+        for stop in stops {
+            let truth = truths
+                .get(&stop.name)
+                .ok_or_else(|| anyhow::anyhow!("no truth was drawn of the view {}", stop.name))?;
+            let mut run = self.stop(&mut engine, stop, truth)?;
+            run.link = link.to_string();
+            run.policy = policy;
+            run.bound_ms = link.bound(run.bytes).as_secs_f64() * 1e3;
+            run.from = std::mem::replace(&mut from, stop.name.clone());
+            runs.push(run);
+        }
+        Ok(runs)
+    }
+
+    fn stop(
+        &self,
+        engine: &mut SimulatedEngine,
+        stop: &Stop,
+        truth: &Picture,
+    ) -> anyhow::Result<StreamRun> {
+        let settings = RenderSettings { camera: stop.camera, ..self.settings };
+        engine.set_view(View { camera: stop.camera, size_px: settings.size_px });
+        let start = engine.time();
+        let mut samples: Vec<Sample> = Vec::new();
+        let mut seen: Vec<(usize, lodestream_protocol::NodeKey)> = Vec::new();
+        let mut plan: Arc<FramePlan>;
+        // At time 0 too: what is there from before counts.
+        let mut step = Duration::ZERO;
+        loop {
+            if self.cancel.load(Ordering::Relaxed) {
+                anyhow::bail!("interrupted");
+            }
+            plan = engine.advance(step);
+            step = self.step;
+            if let Some(problem) = engine.stats().problems.first() {
+                anyhow::bail!("{problem}");
+            }
+            let nodes: Vec<_> = plan.nodes.iter().map(|node| (node.cloud, node.key)).collect();
+            let totals = engine.stats().since_view.totals;
+            if nodes != seen || samples.is_empty() {
+                seen = nodes;
+                let error = self.error(&plan, &settings, truth)?;
+                samples.push(Sample {
+                    ms: (engine.time() - start).as_secs_f64() * 1e3,
+                    bytes: totals.bytes,
+                    requests: totals.requests,
+                    points: plan.points,
+                    ssim: error.ssim.unwrap_or(f64::NAN),
+                    mse: error.mse.unwrap_or(f64::NAN),
+                    holes: error.coverage.holes.of_covered.unwrap_or(0.0),
+                });
+            }
+            if plan.settled || engine.time() - start >= self.patience {
+                break;
+            }
+        }
+        let phase = engine.stats().since_view;
+        Ok(StreamRun {
+            view: stop.name.clone(),
+            from: String::new(),
+            link: String::new(),
+            policy: Policy::Ours,
+            settled_ms: phase.settled_ms,
+            bytes: phase.totals.bytes,
+            requests: phase.totals.requests,
+            points: plan.points,
+            ssim: samples.last().map_or(f64::NAN, |sample| sample.ssim),
+            reached: LEVELS.map(|level| curve::reached(&samples, level)).into(),
+            bound_ms: 0.0,
+            samples,
+        })
+    }
+
+    fn error(
+        &self,
+        plan: &FramePlan,
+        settings: &RenderSettings,
+        truth: &Picture,
+    ) -> anyhow::Result<PictureError> {
+        // As finely as the truth: what is left is the error of what is drawn, not of the pixels.
+        let tree = VisibleTree::of(plan.nodes.iter().map(|n| (n.cloud, n.key, n.spacing)));
+        let clouds = &self.subject.clouds;
+        let renderer = TruthRenderer::new(settings, clouds, tree, self.samples)?;
+        let mut renderer = renderer.jittered(self.seed);
+        for pass in 0..renderer.passes() {
+            if pass > 0 {
+                renderer.next_pass()?;
+            }
+            for node in &plan.nodes {
+                renderer.add_node(node.clone())?;
+            }
+        }
+        let picture = renderer.finish()?.picture;
+        Ok(PictureError::between(&picture, truth)?)
+    }
+}
