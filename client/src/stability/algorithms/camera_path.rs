@@ -84,6 +84,10 @@ pub(super) fn cases() -> Rows {
 
 fn row(case: &'static str, path: &CameraPath, keys: &[KeyFrame]) -> Row {
     let (mut ours, mut single, mut reach) = (0.0f64, 0.0f64, 0.0f64);
+    let rounded = |v: DVec3| v.as_vec3().as_dvec3();
+    let in_single = keys.iter().map(|key| KeyFrame { position: rounded(key.position), ..*key });
+    // The same curve, through places that are floats.
+    let in_single = CameraPath::new(in_single.collect(), false);
     let velocities: Vec<Big3> = (0..keys.len()).map(|i| velocity(keys, i)).collect();
     let reaches = keys.iter().map(|key| key.position.abs().max_element());
     reach = reaches.fold(reach, f64::max);
@@ -100,7 +104,8 @@ fn row(case: &'static str, path: &CameraPath, keys: &[KeyFrame]) -> Row {
                 found.map(|(found, exact)| apart(found, exact)).fold(0.0, f64::max)
             };
             ours = ours.max(off(path.at(time).eye));
-            single = single.max(off(in_single(from, to, time)));
+            let rounded = in_single.as_ref().map(|path| rounded(path.at(time).eye));
+            single = single.max(rounded.map_or(f64::INFINITY, off));
         }
     }
     let length =
@@ -150,12 +155,4 @@ fn between(from: &KeyFrame, to: &KeyFrame, velocities: [&Big3; 2], time: f64) ->
             + &step * (&q[a] - &p[a])
             + &seconds * (&first * &velocities[0][a] + &second * &velocities[1][a])
     })
-}
-
-/// What is left of it where cameras are floats: the straight line between rounded keys would do as
-/// well.
-fn in_single(from: &KeyFrame, to: &KeyFrame, time: f64) -> DVec3 {
-    let s = ((time - from.time) / (to.time - from.time)) as f32;
-    let (p, q) = (from.position.as_vec3(), to.position.as_vec3());
-    (p + s * (q - p)).as_dvec3()
 }
