@@ -22,6 +22,9 @@ const REFERENCE: &str = "lattice, eye and axes as they are, in 512-bit floats";
 const RELATIVE: &str = "roundings of the difference's own size, not of the coordinates'";
 const SINGLE: &str = "half an ulp of the single precision that depths are kept in";
 
+/// Bits of the side of the nodes that points are placed by way of.
+const NODE_BITS: u8 = 12;
+
 /// A lattice and an eye in it.
 struct Case {
     name: &'static str,
@@ -79,7 +82,7 @@ fn views() -> Vec<Case> {
 
 pub(super) fn cases() -> Rows {
     let mut rng = Rng::with_seed(9);
-    let mut rows: Vec<Row> = views().iter().map(|case| transform(case, &mut rng)).collect();
+    let mut rows: Vec<Row> = views().iter().flat_map(|case| transform(case, &mut rng)).collect();
     rows.extend(depths()?);
     Ok(rows)
 }
@@ -90,8 +93,9 @@ fn settings(eye: DVec3, size_px: [u32; 2]) -> RenderSettings {
     RenderSettings::new(size_px, Camera { eye, target, up: DVec3::Z, projection })
 }
 
-/// View space places of points near the eye, in the distance.
-fn transform(case: &Case, rng: &mut Rng) -> Row {
+/// View space places of points near the eye: of lattice points themselves, as anchors are placed, and
+/// by way of their node's corner.
+fn transform(case: &Case, rng: &mut Rng) -> [Row; 2] {
     let lattice = &case.lattice;
     let eye = DVec3::from(case.eye);
     let settings = settings(eye, [100, 100]);
@@ -99,7 +103,7 @@ fn transform(case: &Case, rng: &mut Rng) -> Row {
     let basis = settings.camera.basis();
     // The axes are those that the product has: what is measured is the difference.
     let axes = [basis.right, basis.up, basis.forward].map(big3);
-    let [mut ours, mut single, mut double] = [0.0f64; 3];
+    let [mut ours, mut by_corner, mut single, mut double] = [0.0f64; 4];
     for _ in 0..300 {
         let q: [u32; 3] = std::array::from_fn(|a| {
             let steps = ((case.eye[a] - lattice.offset[a]) / lattice.scale) as i64;
@@ -116,22 +120,31 @@ fn transform(case: &Case, rng: &mut Rng) -> Row {
             let found = found.to_array().into_iter().zip(&place);
             found.map(|(found, exact)| apart(found, exact)).fold(0.0, f64::max) / distance
         };
-        // As renderers do: an anchor near the eye, and integers from there.
-        let anchor: [u32; 3] = std::array::from_fn(|a| q[a] & !0xff);
-        let node = view.node(lattice, NodeKey::ROOT, anchor);
-        let rest = DVec3::from(std::array::from_fn(|a| f64::from(q[a] - anchor[a])));
-        ours = ours.max(
-            error(node.origin + node.step * rest)
-                .min(error(view.node(lattice, NodeKey::ROOT, q).origin)),
-        );
+        ours = ours.max(error(view.node(lattice, NodeKey::ROOT, q).origin));
+        let key = NodeKey::new(lattice.side_bits - NODE_BITS, q.map(|c| c >> NODE_BITS));
+        by_corner = by_corner.max(key.map_or(f64::INFINITY, |key| {
+            let node = view.node(lattice, key, [0; 3]);
+            let corner = lattice.node_min(key);
+            let local = std::array::from_fn(|a| f64::from(q[a] - corner[a]));
+            let side = lattice.node_side_world(key.level());
+            error(node.origin + node.step * DVec3::from(local)) * distance / (distance + side)
+        }));
         let world = DVec3::from(lattice.world(q));
         let turn = |d: DVec3| DVec3::new(d.dot(basis.right), d.dot(basis.up), d.dot(basis.forward));
         single = single.max(error(turn((world.as_vec3() - eye.as_vec3()).as_dvec3())));
         double = double.max(error(turn(world - eye)));
     }
-    Row::new(case.name, (ours, "of the distance"), (8.0 * f64::EPSILON, RELATIVE), REFERENCE)
-        .beside("world coordinates in single precision", single)
-        .beside("world coordinates in double precision", double)
+    let itself =
+        Row::new(case.name, (ours, "of the distance"), (8.0 * f64::EPSILON, RELATIVE), REFERENCE)
+            .beside("world coordinates in single precision", single)
+            .beside("world coordinates in double precision", double);
+    let by_corner = Row::new(
+        format!("by way of the node's corner: {}", case.name),
+        (by_corner, "of distance and node"),
+        (8.0 * f64::EPSILON, "roundings of the size of the node and its distance"),
+        REFERENCE,
+    );
+    [itself, by_corner]
 }
 
 /// Distances that a picture holds, from a thousandth to ten million.
