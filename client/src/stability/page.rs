@@ -123,23 +123,21 @@ fn rows<'a>(rows: impl Iterator<Item = &'a Row>) -> Markup {
         ("case", Align::Text),
         ("error", Align::Number),
         ("tolerance", Align::Number),
-        ("unit", Align::Word),
         ("", Align::Word),
         ("by usual shortcuts", Align::Text),
-        ("why this tolerance, and what it is measured against", Align::Fine),
+        ("why this tolerance; measured against", Align::Fine),
     ]);
     for row in rows {
         let tone = if row.passed { Tone::Good } else { Tone::Bad };
         let verdict = if row.passed { "holds" } else { "missed" };
         table.rows.push(vec![
             Cell::Markup(powers(&row.case)),
-            Cell::Markup(if row.passed {
-                figure(row.error)
-            } else {
-                html! { span.bad-number { (figure(row.error)) } }
+            Cell::Markup(html! {
+                @if row.passed { (figure(row.error)) }
+                @else { span.bad-number { (figure(row.error)) } }
+                div.unit { (row.unit) }
             }),
             Cell::Markup(figure(row.tolerance)),
-            Cell::Markup(html! { span.unit { (row.unit) } }),
             Cell::Chip(verdict.into(), tone),
             Cell::Markup(shortcuts(row)),
             Cell::Markup(html! { (row.reason) "; against " (row.reference) }),

@@ -86,7 +86,7 @@ fn dead_centre() -> Row {
         (TOLERANCE, ROOT),
         "the size alone: nothing is taken off straight ahead",
     )
-    .beside("acos of the cosine as it comes: nodes that are no number", f64::from(shortcut))
+    .beside("acos unclamped (nodes without a number)", f64::from(shortcut))
 }
 
 /// Points drawn for the smallest and the largest budget.
