@@ -21,6 +21,8 @@ pub struct EngineConfig {
     pub coalesce: Coalesce,
     /// In which order wanted pieces are loaded.
     pub order: LoadOrder,
+    /// Whether a request is held back while those before it keep the link busy.
+    pub paces: bool,
     /// Whether requests that nothing wants any more are broken off.
     pub cancels: bool,
     /// Bytes that the first request asks for: header, manifest and root page, and what lies behind
@@ -77,6 +79,7 @@ impl Default for EngineConfig {
             requests_in_flight: 6,
             coalesce: Coalesce::default(),
             order: LoadOrder::Importance,
+            paces: true,
             cancels: true,
             speculative_bytes: BOOT_SPECULATIVE_BYTES,
             attributes: vec!["color".into()],

@@ -42,6 +42,7 @@ impl Policy {
         // No payloads with the first bytes.
         let apart = EngineConfig {
             coalesce: Coalesce::NONE,
+            paces: false,
             cancels: false,
             speculative_bytes: HEADER_BYTES as u64,
             ..config.clone()

@@ -1,12 +1,15 @@
 //! A request in flight.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicU64, Ordering},
+use std::{
+    sync::{
+        Arc, OnceLock,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
 };
 
 use bytes::Bytes;
-use tokio::{sync::mpsc::UnboundedSender, task::AbortHandle};
+use tokio::{sync::mpsc::UnboundedSender, task::AbortHandle, time::Instant};
 
 use crate::source::{Source, SourceError};
 
@@ -26,26 +29,45 @@ pub struct Flight {
     /// By offset.
     pub pieces: Vec<Piece>,
     len: u64,
-    received: Arc<AtomicU64>,
+    sent: Instant,
+    progress: Arc<Progress>,
     task: AbortHandle,
+}
+
+/// What a host has delivered for all requests.
+#[derive(Debug, Default)]
+pub struct Delivered {
+    pub bytes: AtomicU64,
+    /// So many bytes are to be told.
+    pub waited_for: AtomicU64,
+}
+
+/// What has come of a request.
+#[derive(Debug, Default)]
+struct Progress {
+    bytes: AtomicU64,
+    /// When the first byte came, and how many the host had delivered by then.
+    first: OnceLock<(Instant, u64)>,
 }
 
 impl Flight {
     /// Sends a request for `pieces`, which lie in order and do not overlap, on the current runtime.
-    /// What arrives goes to `messages`; the last message is always [`Message::Finished`].
+    /// What arrives goes to `messages`; the last message is always [`Message::Finished`]. What the host
+    /// delivers counts in `delivered`; when that reaches what was waited for, it is told too.
     pub fn start(
         id: FlightId,
         source: Source,
         pieces: Vec<Piece>,
         shared: Arc<Shared>,
         messages: UnboundedSender<Message>,
+        delivered: Arc<Delivered>,
     ) -> Self {
         let cloud = pieces.first().map_or(0, |piece| piece.id.node.cloud);
         let start = pieces.first().map_or(0, |piece| piece.offset);
         let len = pieces.last().map_or(start, Piece::end) - start;
-        let received = Arc::new(AtomicU64::new(0));
+        let progress = Arc::new(Progress::default());
         let mut cutter = Cutter::new(pieces.iter().map(|piece| (piece.offset, piece.len)));
-        let counter = Arc::clone(&received);
+        let counted = Arc::clone(&progress);
         let task = tokio::spawn(async move {
             let mut end = End { id, messages, result: None };
             shared.counters.requests.add(1);
@@ -53,7 +75,14 @@ impl Flight {
                 .stream_range(start, len, &mut |bytes: Bytes| {
                     let count = bytes.len() as u64;
                     shared.counters.bytes.add(count);
-                    counter.fetch_add(count, Ordering::Relaxed);
+                    counted.bytes.fetch_add(count, Ordering::Relaxed);
+                    let before = delivered.bytes.fetch_add(count, Ordering::Relaxed);
+                    counted.first.get_or_init(|| (Instant::now(), before));
+                    let due = delivered.waited_for.load(Ordering::Relaxed);
+                    if before < due && before + count >= due {
+                        // The loader outlives its requests, save when it shuts down.
+                        let _ = end.messages.send(Message::Nearing);
+                    }
                     cutter.push(bytes, |index, bytes| {
                         // The loader outlives its requests, save when it shuts down.
                         let _ = end.messages.send(Message::Arrived { flight: id, index, bytes });
@@ -62,14 +91,27 @@ impl Flight {
                 .await;
             end.result = Some(result);
         });
-        Self { cloud, pieces, len, received, task: task.abort_handle() }
+        let sent = Instant::now();
+        Self { cloud, pieces, len, sent, progress, task: task.abort_handle() }
     }
 
     /// Whether so little is missing that breaking off would cost more than it saves: a connection
     /// that is broken off cannot be used again.
     pub fn is_nearly_done(&self) -> bool {
-        let received = self.received.load(Ordering::Relaxed);
+        let received = self.progress.bytes.load(Ordering::Relaxed);
         received.saturating_mul(4) >= self.len.saturating_mul(3)
+    }
+
+    /// Bytes that are still to come.
+    pub fn left_bytes(&self) -> u64 {
+        self.len.saturating_sub(self.progress.bytes.load(Ordering::Relaxed))
+    }
+
+    /// How long the first byte took; and since then, what the host delivered for all requests, of
+    /// `delivered` ever, in what time. `None` where nothing has come.
+    pub fn measured(&self, delivered: u64) -> Option<(Duration, u64, Duration)> {
+        let &(first, before) = self.progress.first.get()?;
+        Some((first - self.sent, delivered.saturating_sub(before), first.elapsed()))
     }
 
     /// Breaks the request off.

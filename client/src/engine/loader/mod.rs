@@ -10,11 +10,12 @@ mod cutter;
 mod decode;
 mod flight;
 mod open;
+mod pace;
 mod pieces;
 
 use std::{
     collections::{HashMap, HashSet},
-    sync::Arc,
+    sync::{Arc, atomic::Ordering},
 };
 
 use bytes::Bytes;
@@ -30,8 +31,9 @@ use crate::source::{Backoff, Source, SourceError};
 use self::{
     coalesce::Wanted,
     decode::Decoded,
-    flight::{Flight, FlightId},
+    flight::{Delivered, Flight, FlightId},
     open::Opened,
+    pace::Pace,
     pieces::{PieceState, Pieces},
 };
 use super::{
@@ -61,6 +63,8 @@ enum Message {
         index: usize,
         bytes: Bytes,
     },
+    /// A request has so little to come that the next may be sent.
+    Nearing,
     Finished {
         flight: FlightId,
         result: Result<(), SourceError>,
@@ -78,6 +82,9 @@ struct Cloud {
     boot: Option<Arc<Boot>>,
     /// The first bytes of the file.
     prefix: Bytes,
+    /// Bytes of payloads and pages that have come.
+    delivered: Arc<Delivered>,
+    pace: Pace,
     /// Failed requests in a row.
     failures: u32,
     /// No request before then.
@@ -110,6 +117,8 @@ impl Loader {
             source,
             boot: None,
             prefix: Bytes::new(),
+            delivered: Arc::default(),
+            pace: Pace::default(),
             failures: 0,
             not_before: None,
             failed: false,
@@ -230,6 +239,8 @@ impl Loader {
                     self.start_decoding(piece, bytes);
                 }
             }
+            // What may be sent is, after every message.
+            Message::Nearing => {}
             Message::Finished { flight, result } => {
                 // A flight that was broken off is no longer there.
                 if let Some(ended) = self.flights.remove(&flight) {
@@ -299,6 +310,10 @@ impl Loader {
         let cloud = &mut self.clouds[flight.cloud];
         let error = match result {
             Ok(()) => {
+                let delivered = cloud.delivered.bytes.load(Ordering::Relaxed);
+                if let Some((wait, bytes, time)) = flight.measured(delivered) {
+                    cloud.pace.note(wait, bytes, time);
+                }
                 cloud.not_before = None;
                 if std::mem::take(&mut cloud.failures) > 0 {
                     self.shared.board.post(|news| news.clouds[flight.cloud].trouble = None);
@@ -351,6 +366,9 @@ impl Loader {
             for run in self.runs(now).into_iter().take(free) {
                 self.start_flight(run);
             }
+            if self.config.paces {
+                self.wait_for_turns();
+            }
         }
         let queued = self.demand.iter().filter(|piece| self.pieces.get(piece.id).is_none()).count();
         self.shared.counters.queued.set(queued as u64);
@@ -386,10 +404,19 @@ impl Loader {
     /// The requests that the demand comes to, most important first.
     fn runs(&self, now: Instant) -> Vec<Vec<Piece>> {
         let mut wanted: Vec<Vec<Wanted>> = vec![Vec::new(); self.clouds.len()];
+        // What matters less does not ride along while what matters more waits.
+        let clouds = 0..self.clouds.len();
+        let mut allowed: Vec<_> = clouds.map(|cloud| self.allowance(cloud)).collect();
         for (rank, piece) in self.demand.iter().enumerate() {
             let cloud = &self.clouds[piece.id.node.cloud];
             let paused = cloud.not_before.is_some_and(|until| until > now);
             if !paused && !cloud.failed && self.pieces.is_free(piece.id, now) {
+                // The last may be longer: one piece at least.
+                let allowed = &mut allowed[piece.id.node.cloud];
+                if *allowed == 0 {
+                    continue;
+                }
+                *allowed = allowed.saturating_sub(piece.len);
                 let alone = self.pieces.needs_own_request(piece.id);
                 let wanted = &mut wanted[piece.id.node.cloud];
                 wanted.push(Wanted { rank, offset: piece.offset, len: piece.len, alone });
@@ -405,16 +432,41 @@ impl Loader {
         pieces.collect()
     }
 
+    /// Bytes that may be asked for of a cloud: none while those in flight keep its link busy.
+    fn allowance(&self, cloud: usize) -> u64 {
+        if !self.config.paces {
+            return u64::MAX;
+        }
+        let flights = self.flights.values().filter(|flight| flight.cloud == cloud);
+        let left: u64 = flights.map(Flight::left_bytes).sum();
+        let limit = self.clouds[cloud].pace.limit_bytes();
+        if left > limit { 0 } else { 2 * limit - left }
+    }
+
+    /// Has it told when more may be asked for.
+    fn wait_for_turns(&self) {
+        for (index, cloud) in self.clouds.iter().enumerate() {
+            let flights = self.flights.values().filter(|flight| flight.cloud == index);
+            let left: u64 = flights.map(Flight::left_bytes).sum();
+            let turn = left.saturating_sub(cloud.pace.limit_bytes());
+            let delivered = cloud.delivered.bytes.load(Ordering::Relaxed);
+            cloud.delivered.waited_for.store(delivered + turn, Ordering::Relaxed);
+        }
+    }
+
     fn start_flight(&mut self, pieces: Vec<Piece>) {
         let Some(first) = pieces.first() else { return };
-        let source = self.clouds[first.id.node.cloud].source.clone();
+        let cloud = &self.clouds[first.id.node.cloud];
+        let (source, delivered) = (cloud.source.clone(), Arc::clone(&cloud.delivered));
         let id = self.next_flight;
         self.next_flight += 1;
         for piece in &pieces {
             self.pieces.set(piece.id, PieceState::Loading { flight: id });
         }
         let shared = Arc::clone(&self.shared);
-        self.flights.insert(id, Flight::start(id, source, pieces, shared, self.sender.clone()));
+        let sender = self.sender.clone();
+        let flight = Flight::start(id, source, pieces, shared, sender, delivered);
+        self.flights.insert(id, flight);
     }
 
     /// When something that waits after a failure may go on.
