@@ -10,7 +10,7 @@ use std::{
 
 use bytes::Bytes;
 
-use super::{Prefix, SourceError};
+use super::{Announced, SourceError};
 
 /// A local dataset file. Clones share the open file.
 #[derive(Debug, Clone)]
@@ -73,9 +73,15 @@ impl FileSource {
         Ok(())
     }
 
-    pub(super) async fn read_prefix(&self, len: u64) -> Result<Prefix, SourceError> {
-        let bytes = self.read(0, len.min(self.inner.len)).await?;
-        Ok(Prefix { bytes, total: Some(self.inner.len) })
+    pub(super) async fn stream_prefix(
+        &self,
+        len: u64,
+        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
+    ) -> Result<(), SourceError> {
+        let total = self.inner.len;
+        let bytes = self.read(0, len.min(total)).await?;
+        sink(bytes, Announced { len: len.min(total), total: Some(total) });
+        Ok(())
     }
 
     /// Reads on this thread.

@@ -16,7 +16,7 @@ use reqwest::{
     header::{self, HeaderMap},
 };
 
-use super::{Joiner, Prefix, SourceError};
+use super::{Announced, SourceError};
 
 /// How long a host may be silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,17 +126,19 @@ impl HttpSource {
         self.read_body(response, range.end - range.start, sink).await
     }
 
-    pub(super) async fn read_prefix(&self, len: u64) -> Result<Prefix, SourceError> {
+    pub(super) async fn stream_prefix(
+        &self,
+        len: u64,
+        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
+    ) -> Result<(), SourceError> {
         let (response, range) = self.ask(Ask { offset: 0, len, may_end: true }).await?;
-        let expected = range.end - range.start;
-        let mut joiner = Joiner::default();
-        self.read_body(response, expected, &mut |piece| joiner.push(piece, expected)).await?;
-        Ok(Prefix { bytes: joiner.finish(), total: range.total })
+        let announced = Announced { len: range.end - range.start, total: range.total };
+        self.read_body(response, announced.len, &mut |piece| sink(piece, announced)).await
     }
 
     pub(super) async fn size(&self) -> Result<u64, SourceError> {
         if self.inner.identity.get().is_none() {
-            self.read_prefix(1).await?;
+            self.stream_prefix(1, &mut |_, _| {}).await?;
         }
         let total = self.inner.identity.get().and_then(|identity| identity.total);
         total.ok_or_else(|| self.permanent("the host does not tell the length of the file"))

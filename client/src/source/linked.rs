@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use super::{FileSource, Link, Prefix, SourceError};
+use super::{Announced, FileSource, Link, SourceError};
 
 /// A local dataset file whose bytes come as slowly as a [`Link`] lets them.
 ///
@@ -44,10 +44,13 @@ impl LinkedSource {
         Ok(())
     }
 
-    pub(super) async fn read_prefix(&self, len: u64) -> Result<Prefix, SourceError> {
-        let len = len.min(self.file.len());
-        let bytes = self.file.read_now(0, len)?;
-        self.link.carry(0, len, |_| {}).await;
-        Ok(Prefix { bytes, total: Some(self.file.len()) })
+    pub(super) async fn stream_prefix(
+        &self,
+        len: u64,
+        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
+    ) -> Result<(), SourceError> {
+        let total = self.file.len();
+        let announced = Announced { len: len.min(total), total: Some(total) };
+        self.stream_range(0, announced.len, &mut |piece| sink(piece, announced)).await
     }
 }

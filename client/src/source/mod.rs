@@ -53,6 +53,15 @@ pub struct Prefix {
     pub total: Option<u64>,
 }
 
+/// What an answer says before its bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Announced {
+    /// Bytes that come.
+    pub len: u64,
+    /// Length of the whole file in bytes, where the host tells.
+    pub total: Option<u64>,
+}
+
 impl Source {
     /// Opens what a user names: a file, `http(s)://host/…/NAME.lods`, or a server's address with a
     /// dataset's name (`http://host:8080/courtyard`, `127.0.0.1:8080/courtyard`).
@@ -116,10 +125,29 @@ impl Source {
     /// # Errors
     /// As for [`stream_range`](Self::stream_range).
     pub async fn read_prefix(&self, len: u64) -> Result<Prefix, SourceError> {
+        let (mut joiner, mut total) = (Joiner::default(), None);
+        let mut join = |piece, announced: Announced| {
+            total = announced.total;
+            joiner.push(piece, announced.len);
+        };
+        self.stream_prefix(len, &mut join).await?;
+        Ok(Prefix { bytes: joiner.finish(), total })
+    }
+
+    /// Hands the first `len` bytes, or all where the file is shorter, to `sink` as they arrive; each
+    /// piece with what the host has announced.
+    ///
+    /// # Errors
+    /// As for [`stream_range`](Self::stream_range).
+    pub async fn stream_prefix(
+        &self,
+        len: u64,
+        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
+    ) -> Result<(), SourceError> {
         match self {
-            Self::Http(source) => source.read_prefix(len).await,
-            Self::File(source) => source.read_prefix(len).await,
-            Self::Linked(source) => source.read_prefix(len).await,
+            Self::Http(source) => source.stream_prefix(len, sink).await,
+            Self::File(source) => source.stream_prefix(len, sink).await,
+            Self::Linked(source) => source.stream_prefix(len, sink).await,
         }
     }
 

@@ -32,7 +32,7 @@ use self::{
     coalesce::Wanted,
     decode::Decoded,
     flight::{Delivered, Flight, FlightId},
-    open::Opened,
+    open::Opening,
     pace::Pace,
     pieces::{PieceState, Pieces},
 };
@@ -53,9 +53,15 @@ const MAX_DAMAGED: u32 = 3;
 /// What the loader's tasks tell it. At most one message per piece and request is ever waiting.
 #[derive(Debug)]
 enum Message {
-    Opened {
+    /// More of a cloud's first bytes has come.
+    Opening {
         cloud: usize,
-        result: Result<Opened, String>,
+        opening: Opening,
+    },
+    /// A cloud can never be opened.
+    Unopened {
+        cloud: usize,
+        message: String,
     },
     /// The piece with that index among the flight's.
     Arrived {
@@ -80,8 +86,9 @@ enum Message {
 struct Cloud {
     source: Source,
     boot: Option<Arc<Boot>>,
-    /// The first bytes of the file.
+    /// The first bytes of the file, and how many of them will come in all.
     prefix: Bytes,
+    prefix_end: u64,
     /// Bytes of payloads and pages that have come.
     delivered: Arc<Delivered>,
     pace: Pace,
@@ -90,6 +97,13 @@ struct Cloud {
     /// No request before then.
     not_before: Option<Instant>,
     failed: bool,
+}
+
+impl Cloud {
+    /// Bytes of the prefix that are still to come.
+    fn prefix_left(&self) -> u64 {
+        self.prefix_end.saturating_sub(self.prefix.len() as u64)
+    }
 }
 
 /// The thread's state.
@@ -117,6 +131,7 @@ impl Loader {
             source,
             boot: None,
             prefix: Bytes::new(),
+            prefix_end: 0,
             delivered: Arc::default(),
             pace: Pace::default(),
             failures: 0,
@@ -151,8 +166,12 @@ impl Loader {
             let source = self.clouds[cloud].source.clone();
             let speculative = self.config.speculative_bytes;
             tokio::spawn(async move {
-                let result = open::open(&shared, cloud, &source, speculative).await;
-                let _ = sender.send(Message::Opened { cloud, result });
+                // The loader outlives its tasks, save when it shuts down.
+                let tell = |opening| _ = sender.send(Message::Opening { cloud, opening });
+                let result = open::open(&shared, cloud, &source, speculative, tell).await;
+                if let Err(message) = result {
+                    let _ = sender.send(Message::Unopened { cloud, message });
+                }
             });
         }
         loop {
@@ -226,12 +245,8 @@ impl Loader {
 
     fn handle(&mut self, message: Message) {
         match message {
-            Message::Opened { cloud, result: Ok(opened) } => {
-                self.clouds[cloud].boot = Some(Arc::clone(&opened.boot));
-                self.clouds[cloud].prefix = opened.prefix;
-                self.shared.traversal.post(Event::Opened { cloud, boot: opened.boot });
-            }
-            Message::Opened { cloud, result: Err(message) } => self.fail_cloud(cloud, message),
+            Message::Opening { cloud, opening } => self.take_opening(cloud, opening),
+            Message::Unopened { cloud, message } => self.fail_cloud(cloud, message),
             Message::Arrived { flight, index, bytes } => {
                 let Some(flight_) = self.flights.get(&flight) else { return };
                 let piece = flight_.pieces[index].clone();
@@ -248,6 +263,16 @@ impl Loader {
                 }
             }
             Message::Decoded { piece, result } => self.deliver(piece, result),
+        }
+    }
+
+    fn take_opening(&mut self, cloud: usize, opening: Opening) {
+        let known = &mut self.clouds[cloud];
+        known.prefix = opening.prefix;
+        known.prefix_end = opening.expected;
+        if known.boot.is_none() {
+            known.boot = Some(Arc::clone(&opening.boot));
+            self.shared.traversal.post(Event::Opened { cloud, boot: opening.boot });
         }
     }
 
@@ -290,6 +315,7 @@ impl Loader {
                 self.shared.counters.damaged.add(1);
                 // Should the damage be in the bytes at hand, the next try must not use them.
                 cloud.prefix = Bytes::new();
+                cloud.prefix_end = 0;
                 let failures = self.pieces.count_damaged(id);
                 if failures < MAX_DAMAGED {
                     let until = Instant::now() + Backoff::default().delay(failures);
@@ -410,7 +436,8 @@ impl Loader {
         for (rank, piece) in self.demand.iter().enumerate() {
             let cloud = &self.clouds[piece.id.node.cloud];
             let paused = cloud.not_before.is_some_and(|until| until > now);
-            if !paused && !cloud.failed && self.pieces.is_free(piece.id, now) {
+            let on_its_way = piece.end() <= cloud.prefix_end;
+            if !paused && !cloud.failed && !on_its_way && self.pieces.is_free(piece.id, now) {
                 // The last may be longer: one piece at least.
                 let allowed = &mut allowed[piece.id.node.cloud];
                 if *allowed == 0 {
@@ -439,6 +466,7 @@ impl Loader {
         }
         let flights = self.flights.values().filter(|flight| flight.cloud == cloud);
         let left: u64 = flights.map(Flight::left_bytes).sum();
+        let left = left + self.clouds[cloud].prefix_left();
         let limit = self.clouds[cloud].pace.limit_bytes();
         if left > limit { 0 } else { 2 * limit - left }
     }

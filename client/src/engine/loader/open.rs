@@ -1,23 +1,30 @@
 //! Opening a cloud: header, manifest and root page, with one request where possible.
+//!
+//! The cloud is open as soon as these have come; what comes behind them, the payloads of the top
+//! nodes, is handed on as it comes.
 
 use std::sync::Arc;
 
 use bytes::{Bytes, BytesMut};
 use lodestream_protocol::{Boot, Error, HEADER_BYTES, Header};
 
-use crate::source::{Backoff, Source, SourceError};
+use crate::source::{Announced, Backoff, Source, SourceError};
 
 use super::super::shared::Shared;
 
-/// An opened cloud.
+/// What there is of a cloud's first bytes.
 #[derive(Debug)]
-pub struct Opened {
+pub struct Opening {
+    /// What they say.
     pub boot: Arc<Boot>,
     /// The first bytes of the file, in which the payloads of the top nodes may lie.
     pub prefix: Bytes,
+    /// How long the prefix will become.
+    pub expected: u64,
 }
 
 /// Opens `source`, trying again for as long as that may help; asks for `speculative` bytes at first.
+/// Whenever more of them has come, it is told.
 ///
 /// # Errors
 /// What is wrong for good, with the source's name.
@@ -26,15 +33,21 @@ pub async fn open(
     cloud: usize,
     source: &Source,
     speculative: u64,
-) -> Result<Opened, String> {
+    tell: impl Fn(Opening) + Send + Sync,
+) -> Result<(), String> {
     let mut failures = 0;
     loop {
-        match try_open(shared, source, speculative).await {
-            Ok(opened) => {
+        let mut reader = Reader { boot: None, bytes: BytesMut::new(), announced: None };
+        match reader.read(shared, source, speculative, &tell).await {
+            Ok(()) => {
                 shared.board.post(|news| news.clouds[cloud].trouble = None);
-                return Ok(opened);
+                return Ok(());
             }
             Err(Failure::Source(error)) if error.is_transient() => {
+                // What has come is good; the rest is asked for as everything else is.
+                if reader.end(&tell) {
+                    return Ok(());
+                }
                 failures += 1;
                 shared.counters.retries.add(1);
                 shared.board.post(|news| news.clouds[cloud].trouble = Some(error.to_string()));
@@ -63,27 +76,84 @@ impl From<Error> for Failure {
     }
 }
 
-async fn try_open(shared: &Shared, source: &Source, speculative: u64) -> Result<Opened, Failure> {
-    shared.counters.requests.add(1);
-    let first = source.read_prefix(speculative.max(HEADER_BYTES as u64)).await?;
-    shared.counters.bytes.add(first.bytes.len() as u64);
-    let header = Header::parse(&first.bytes)?;
-    if let Some(total) = first.total
-        && total < header.file_bytes
-    {
-        let (needed, available) = (header.file_bytes, total);
-        return Err(Failure::Format(Error::Truncated { what: "dataset", needed, available }));
-    }
-    let mut prefix = first.bytes;
-    let have = prefix.len() as u64;
-    if header.index_bytes() > have {
-        // The header's own check has bounded these sizes.
+/// The first bytes, as they come.
+struct Reader {
+    boot: Option<Arc<Boot>>,
+    bytes: BytesMut,
+    announced: Option<Announced>,
+}
+
+impl Reader {
+    async fn read(
+        &mut self,
+        shared: &Shared,
+        source: &Source,
+        speculative: u64,
+        tell: &(impl Fn(Opening) + Send + Sync),
+    ) -> Result<(), Failure> {
         shared.counters.requests.add(1);
-        let rest = source.read_range(have, header.index_bytes() - have).await?;
-        shared.counters.bytes.add(rest.len() as u64);
-        let mut whole = BytesMut::from(prefix);
-        whole.extend_from_slice(&rest);
-        prefix = whole.freeze();
+        let mut failure = None;
+        let asked = speculative.max(HEADER_BYTES as u64);
+        let mut sink = |piece: Bytes, announced| {
+            shared.counters.bytes.add(piece.len() as u64);
+            self.bytes.extend_from_slice(&piece);
+            self.announced = Some(announced);
+            if failure.is_none() {
+                failure = self.look(tell).err();
+            }
+        };
+        source.stream_prefix(asked, &mut sink).await?;
+        if let Some(error) = failure {
+            return Err(error.into());
+        }
+        if self.boot.is_none() {
+            // Says what is wrong with a file that has no header.
+            let header = Header::parse(&self.bytes)?;
+            let have = self.bytes.len() as u64;
+            // The header's own check has bounded these sizes.
+            shared.counters.requests.add(1);
+            let rest = source.read_range(have, header.index_bytes().saturating_sub(have)).await?;
+            shared.counters.bytes.add(rest.len() as u64);
+            self.bytes.extend_from_slice(&rest);
+            self.announced = None;
+            self.look(tell)?;
+        }
+        Ok(())
     }
-    Ok(Opened { boot: Arc::new(Boot::parse(&prefix)?), prefix })
+
+    /// Opens the cloud if its header, manifest and root page are there; tells what there is.
+    fn look(&mut self, tell: &impl Fn(Opening)) -> Result<(), Error> {
+        if self.boot.is_none() {
+            if self.bytes.len() < HEADER_BYTES {
+                return Ok(());
+            }
+            let header = Header::parse(&self.bytes)?;
+            if let Some(total) = self.announced.and_then(|announced| announced.total)
+                && total < header.file_bytes
+            {
+                let (needed, available) = (header.file_bytes, total);
+                return Err(Error::Truncated { what: "dataset", needed, available });
+            }
+            if (self.bytes.len() as u64) < header.index_bytes() {
+                return Ok(());
+            }
+            self.boot = Some(Arc::new(Boot::parse(&self.bytes)?));
+        }
+        let expected = self.announced.map_or(0, |announced| announced.len);
+        self.tell(expected, tell);
+        Ok(())
+    }
+
+    /// Nothing more comes. Returns whether the cloud is open all the same.
+    fn end(&self, tell: &impl Fn(Opening)) -> bool {
+        self.tell(0, tell);
+        self.boot.is_some()
+    }
+
+    fn tell(&self, expected: u64, tell: &impl Fn(Opening)) {
+        if let Some(boot) = &self.boot {
+            let prefix = Bytes::copy_from_slice(&self.bytes);
+            tell(Opening { boot: Arc::clone(boot), prefix, expected });
+        }
+    }
 }
