@@ -2,6 +2,8 @@
 
 use lodestream_protocol::BOOT_SPECULATIVE_BYTES;
 
+use super::priority::Priority;
+
 /// Settings of an engine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EngineConfig {
@@ -13,6 +15,11 @@ pub struct EngineConfig {
     pub min_size_px: f64,
     /// Whether nodes outside the picture are left out. (Off to measure what that saves.)
     pub culls_outside: bool,
+    /// Whether nodes behind what was drawn are left out, where depths are
+    /// [told](super::Engine::set_depth).
+    pub occlusion: bool,
+    /// Which nodes come first.
+    pub priority: Priority,
     /// Most bytes of decoded nodes that are kept though they are not drawn.
     pub cache_bytes: u64,
     /// Most requests at a time, over all clouds.
@@ -75,6 +82,8 @@ impl Default for EngineConfig {
             point_budget: 1_000_000,
             min_size_px: 40.0,
             culls_outside: true,
+            occlusion: true,
+            priority: Priority::default(),
             cache_bytes: 512 << 20,
             requests_in_flight: 6,
             coalesce: Coalesce::default(),

@@ -7,7 +7,7 @@
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use super::{event::Event, piece::Piece, view::View};
+use super::{event::Event, occlusion::Drawn, piece::Piece, view::View};
 
 /// What the traversal thread reads.
 #[derive(Debug, Default)]
@@ -27,6 +27,8 @@ pub(super) struct TraversalMail {
     pub attributes: Option<Vec<String>>,
     /// Counts changes of the view and of the attributes.
     pub generation: u64,
+    /// The newest picture, where one has been drawn since.
+    pub drawn: Option<Drawn>,
     /// From the loader, oldest first.
     pub events: Vec<Event>,
     /// Events ever posted.
@@ -59,6 +61,12 @@ impl TraversalInbox {
         changed(mail.generation);
         self.tell();
         mail.generation
+    }
+
+    /// Tells of a picture; one that was not read yet is forgotten.
+    pub fn set_drawn(&self, drawn: Drawn) {
+        lock(&self.state).drawn = Some(drawn);
+        self.tell();
     }
 
     /// The newest generation, and whether there is a view at all.
@@ -110,7 +118,11 @@ impl TraversalInbox {
 
 impl TraversalMail {
     const fn is_news(&self) -> bool {
-        !self.events.is_empty() || self.attributes.is_some() || self.unread_view || self.shutdown
+        !self.events.is_empty()
+            || self.attributes.is_some()
+            || self.drawn.is_some()
+            || self.unread_view
+            || self.shutdown
     }
 
     fn collect(&mut self) -> Self {
@@ -119,6 +131,7 @@ impl TraversalMail {
             view: self.view,
             attributes: self.attributes.take(),
             generation: self.generation,
+            drawn: self.drawn.take(),
             events: std::mem::take(&mut self.events),
             posted: self.posted,
             shutdown: self.shutdown,

@@ -12,14 +12,17 @@
 
 mod board;
 mod config;
+mod depth;
 mod drawing;
 mod error;
 mod event;
 mod inbox;
 mod loader;
+mod occlusion;
 mod piece;
 mod plan;
 mod policy;
+mod priority;
 mod selection;
 mod shared;
 mod simulated;
@@ -35,9 +38,12 @@ use lodestream_protocol::Boot;
 
 pub use board::CloudStatus;
 pub use config::{Coalesce, EngineConfig, LoadOrder};
+pub use depth::DepthPyramid;
 pub use error::EngineError;
+pub use occlusion::SplatReach;
 pub use plan::{DrawNode, FramePlan, LeftOut, Tally};
 pub use policy::Policy;
+pub use priority::Priority;
 pub use simulated::SimulatedEngine;
 pub use stats::{EngineStats, Phase, Totals};
 pub use view::View;
@@ -46,6 +52,7 @@ pub(crate) use view::{Optics, WorldBox};
 use self::{
     board::News,
     loader::Loader,
+    occlusion::Drawn,
     shared::{EndOfThread, Shared},
     traversal::Traversal,
 };
@@ -112,6 +119,15 @@ impl Engine {
     /// [`FramePlan::view_generation`] repeats; the same view again keeps its number.
     pub fn set_view(&self, view: View) -> u64 {
         self.shared.traversal.set_view(view, |generation| self.shared.start_phase(generation))
+    }
+
+    /// Tells of the picture that was drawn of a plan: what lies behind it is neither loaded nor drawn
+    /// any more. Pictures of other views than the newest, and those told of before, change nothing. Never
+    /// waits. The depths must be of a picture with one sample a pixel.
+    pub fn set_depth(&self, plan: &FramePlan, depth: Arc<DepthPyramid>, reach: SplatReach) {
+        if let Some(drawn) = Drawn::new(plan, depth, reach) {
+            self.shared.traversal.set_drawn(drawn);
+        }
     }
 
     /// Sets the attributes that the view needs (see [`EngineConfig::attributes`]); counts as a new

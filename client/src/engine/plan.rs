@@ -43,6 +43,9 @@ impl Tally {
 pub struct LeftOut {
     /// Outside the picture.
     pub outside: Tally,
+    /// Behind what is drawn. (The last picture's depths tell:
+    /// [`Engine::set_depth`](super::Engine::set_depth).)
+    pub hidden: Tally,
     /// Smaller than [`EngineConfig::min_size_px`](super::EngineConfig::min_size_px).
     pub small: Tally,
     /// Did not fit into the point budget.
@@ -76,6 +79,6 @@ pub struct FramePlan {
     /// Bytes of decoded nodes that are kept though this plan does not need them.
     pub cached_bytes: u64,
     /// Whether this is all that the view will show: everything wanted is loaded, or has failed for
-    /// good.
+    /// good, and what is left out as hidden lies behind the picture of these very nodes.
     pub settled: bool,
 }

@@ -5,7 +5,10 @@ use std::str::FromStr;
 use lodestream_protocol::HEADER_BYTES;
 use serde::{Deserialize, Serialize};
 
-use super::config::{Coalesce, EngineConfig, LoadOrder};
+use super::{
+    config::{Coalesce, EngineConfig, LoadOrder},
+    priority::Priority,
+};
 
 /// How nodes are fetched. Tree, points, budget and renderer stay the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -44,6 +47,8 @@ impl Policy {
             coalesce: Coalesce::NONE,
             paces: false,
             cancels: false,
+            occlusion: false,
+            priority: Priority::Fraiss,
             speculative_bytes: HEADER_BYTES as u64,
             ..config.clone()
         };

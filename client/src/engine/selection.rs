@@ -1,7 +1,8 @@
 //! Which nodes a view wants: one walk over the trees of all clouds, most important first.
 //!
 //! The result depends on the view, the trees and the previous view's selection only, not on what
-//! is loaded: so the same camera settles on the same picture whatever the network did. It does not
+//! is loaded: so the same camera settles on the same picture whatever the network did. (Which nodes are
+//! left out as hidden does depend on the depths that came back; the picture does not.) It does not
 //! depend on the order in which hierarchy pages arrive either, because a child's priority is capped
 //! to its parent's and a page is as important as the node above it: what lies below an unloaded
 //! page comes after the page.
@@ -13,11 +14,14 @@ use std::{
     sync::Arc,
 };
 
-use lodestream_protocol::{LatticeBox, Node, NodeKey, Refinement};
+use lodestream_protocol::{Lattice, LatticeBox, Node, NodeKey, Refinement};
 
 use super::{
+    occlusion::{Occluders, Suspect},
     piece::NodeId,
     plan::{LeftOut, Tally},
+    priority::{Change, Priority},
+    store::{GroupMask, group_bit},
     tree::{Children, Place, Tree},
     view::{Optics, WorldBox},
 };
@@ -32,6 +36,7 @@ pub(super) struct Limits {
     pub point_budget: u64,
     pub min_size_px: f64,
     pub culls_outside: bool,
+    pub priority: Priority,
 }
 
 /// A wanted node.
@@ -63,18 +68,23 @@ pub(super) struct Selection {
     pub left_out: LeftOut,
 }
 
-/// Walks the trees.
+/// Walks the trees. `groups` tells for each cloud which groups are wanted, `occluders` what may
+/// hide nodes.
 pub(super) fn select(
     trees: &mut [Option<Tree>],
+    groups: &[GroupMask],
     optics: &Optics,
     limits: Limits,
     previous: &HashSet<NodeId>,
+    occluders: Option<Occluders>,
 ) -> Selection {
     let mut walk = Walk {
         trees,
+        groups,
         optics,
         limits,
         previous,
+        occluders,
         heap: BinaryHeap::new(),
         out: Selection::default(),
     };
@@ -136,15 +146,18 @@ impl Eq for Candidate {}
 /// How a node stands in the view.
 enum Sight {
     Outside,
+    Hidden,
     Small { priority: f64 },
     Seen { priority: f64 },
 }
 
 struct Walk<'a> {
     trees: &'a mut [Option<Tree>],
+    groups: &'a [GroupMask],
     optics: &'a Optics,
     limits: Limits,
     previous: &'a HashSet<NodeId>,
+    occluders: Option<Occluders<'a>>,
     heap: BinaryHeap<Candidate>,
     out: Selection,
 }
@@ -153,7 +166,8 @@ impl Walk<'_> {
     fn push_root(&mut self, cloud: usize) {
         let Some(place) = self.trees[cloud].as_mut().and_then(Tree::start_walk) else { return };
         // The root has no parent to stand for it: it is shown however small it is.
-        match self.look(cloud, &place.node) {
+        match self.look(cloud, &place.node, None) {
+            Sight::Hidden => {}
             Sight::Outside => self.out.left_out.outside.add(place.node.points),
             Sight::Small { priority } | Sight::Seen { priority } => {
                 self.push(cloud, &place.node.clone(), priority, What::Node { place, parent: None });
@@ -288,16 +302,18 @@ impl Walk<'_> {
             }
             Children::Known(children) => match self.out.picks[pick].refinement {
                 Refinement::Additive => self.offer_each(cloud, children, pick),
-                Refinement::Replace => self.offer_family(cloud, &place.node, children, pick),
+                Refinement::Replace => self.offer_family(cloud, children, pick),
             },
         }
     }
 
     fn offer_each(&mut self, cloud: usize, children: Vec<Place>, parent: usize) {
         let cap = self.out.picks[parent].priority;
+        let above = Arc::clone(&self.out.picks[parent].node);
         for place in children {
-            match self.look(cloud, &place.node) {
+            match self.look(cloud, &place.node, Some(&above)) {
                 Sight::Outside => self.out.left_out.outside.add(place.node.points),
+                Sight::Hidden => self.out.left_out.hidden.add(place.node.points),
                 Sight::Small { .. } => self.out.left_out.small.add(place.node.points),
                 Sight::Seen { priority } => {
                     let node = Arc::clone(&place.node);
@@ -309,13 +325,15 @@ impl Walk<'_> {
     }
 
     /// A node is replaced by all of its children that can be seen, or not at all.
-    fn offer_family(&mut self, cloud: usize, node: &Node, children: Vec<Place>, pick: usize) {
+    fn offer_family(&mut self, cloud: usize, children: Vec<Place>, pick: usize) {
         let cap = self.out.picks[pick].priority;
+        let above = Arc::clone(&self.out.picks[pick].node);
         let (mut family, mut small) = (Vec::new(), Tally::default());
         let mut most: Option<f64> = None;
         for place in children {
-            match self.look(cloud, &place.node) {
+            match self.look(cloud, &place.node, Some(&above)) {
                 Sight::Outside => self.out.left_out.outside.add(place.node.points),
+                Sight::Hidden => self.out.left_out.hidden.add(place.node.points),
                 Sight::Small { priority } => {
                     small.add(place.node.points);
                     family.push((place, priority.min(cap)));
@@ -328,7 +346,7 @@ impl Walk<'_> {
         }
         match most {
             Some(priority) => {
-                self.push(cloud, node, priority, What::Family { pick, children: family })
+                self.push(cloud, &above, priority, What::Family { pick, children: family })
             }
             None => {
                 self.out.left_out.small.nodes += small.nodes;
@@ -341,17 +359,32 @@ impl Walk<'_> {
         self.limits.culls_outside && self.optics.is_outside(bounds)
     }
 
-    fn look(&self, cloud: usize, node: &Node) -> Sight {
+    /// How `node`, a child of `above`, stands in the view.
+    fn look(&mut self, cloud: usize, node: &Node, above: Option<&Node>) -> Sight {
         let Some(tree) = &self.trees[cloud] else { return Sight::Outside };
         let lattice = &tree.boot().manifest.lattice;
         let bounds = WorldBox::of(&node.bounds, lattice);
         if self.is_outside(&bounds) {
             return Sight::Outside;
         }
+        if let Some(above) = above
+            && self.is_hidden(cloud, node, above, bounds)
+        {
+            return Sight::Hidden;
+        }
+        let Some(tree) = &self.trees[cloud] else { return Sight::Outside };
+        let lattice = &tree.boot().manifest.lattice;
         let bonus =
             if self.previous.contains(&NodeId { cloud, key: node.key }) { HYSTERESIS } else { 1.0 };
-        let size = self.optics.projected_size(bounds.center, bounds.radius());
-        let priority = bonus * self.optics.priority(bounds.center, size);
+        let wanted = node.payloads.iter().enumerate();
+        let wanted = wanted.filter(|&(group, _)| self.groups[cloud] & group_bit(group) != 0);
+        let change = Change {
+            // Where there is nothing, the whole is missing.
+            error_before: above.map_or(2.0 * bounds.radius(), coarseness),
+            error_after: coarseness(node),
+            bytes: wanted.map(|(_, payload)| u64::from(payload.bytes)).sum(),
+        };
+        let priority = bonus * self.limits.priority.of(self.optics, &bounds, change);
         // Whether the node is worth its detail is a matter of its cube: by its tight bounds a node
         // with few points would never show, and the density of its neighbours' would not be its.
         let cube = cube_radius(lattice.node_side_world(node.key.level()));
@@ -362,30 +395,55 @@ impl Walk<'_> {
         }
     }
 
+    fn is_hidden(&mut self, cloud: usize, node: &Node, above: &Node, bounds: WorldBox) -> bool {
+        let (Some(occluders), Some(tree)) = (&mut self.occluders, &self.trees[cloud]) else {
+            return false;
+        };
+        let manifest = &tree.boot().manifest;
+        if manifest.refinement == Refinement::Replace {
+            return false;
+        }
+        let octant = octant_within(node.key, &manifest.bounds, &manifest.lattice);
+        let suspect = Suspect {
+            id: NodeId { cloud, key: node.key },
+            bounds,
+            octant: octant.map_or(bounds, |octant| WorldBox::of(&octant, &manifest.lattice)),
+            spacing: f64::from(node.spacing),
+            spacing_above: f64::from(above.spacing),
+        };
+        occluders.hide(self.optics, &suspect)
+    }
+
     /// Whether a child of `node`, of which only the octant is known, can turn out to be
     /// [`Sight::Seen`]. Says yes in doubt.
     fn may_show_children(&self, cloud: usize, node: &Node) -> bool {
         let Some(tree) = &self.trees[cloud] else { return false };
         let lattice = &tree.boot().manifest.lattice;
         node.children().any(|key| {
-            let corner = lattice.node_min(key);
-            let last = u32::try_from((1u64 << lattice.node_bits(key.level())) - 1);
-            let last = last.unwrap_or(u32::MAX);
-            let octant = LatticeBox {
-                min: std::array::from_fn(|a| node.bounds.min[a].max(corner[a])),
-                max: std::array::from_fn(|a| {
-                    node.bounds.max[a].min(corner[a].saturating_add(last))
-                }),
-            };
-            if (0..3).any(|axis| octant.min[axis] > octant.max[axis]) {
-                return false;
-            }
+            let Some(octant) = octant_within(key, &node.bounds, lattice) else { return false };
             let octant = WorldBox::of(&octant, lattice);
             let cube = cube_radius(lattice.node_side_world(key.level()));
             let largest = HYSTERESIS * self.optics.largest_projected_size(&octant, cube);
             !self.is_outside(&octant) && largest >= self.limits.min_size_px
         })
     }
+}
+
+/// The part of a node's cube that lies in a box; `None` where there is none.
+fn octant_within(key: NodeKey, bounds: &LatticeBox, lattice: &Lattice) -> Option<LatticeBox> {
+    let corner = lattice.node_min(key);
+    let last = u32::try_from((1u64 << lattice.node_bits(key.level())) - 1).unwrap_or(u32::MAX);
+    let octant = LatticeBox {
+        min: std::array::from_fn(|a| bounds.min[a].max(corner[a])),
+        max: std::array::from_fn(|a| bounds.max[a].min(corner[a].saturating_add(last))),
+    };
+    (0..3).all(|axis| octant.min[axis] <= octant.max[axis]).then_some(octant)
+}
+
+/// World units by which the picture is off where a node is the finest that is drawn. A leaf brings all
+/// there is, but its points have their distance, too.
+fn coarseness(node: &Node) -> f64 {
+    f64::from(node.geometric_error.max(node.spacing))
 }
 
 /// Radius of the sphere around a cube.
@@ -399,7 +457,7 @@ mod tests {
 
     use glam::DVec3;
     use lodestream_protocol::{
-        Boot, GroupInfo, Header, HierarchyPage, Lattice, Manifest, Method, PageRef, Primitive,
+        Boot, GroupInfo, Header, HierarchyPage, Manifest, Method, PageRef, PayloadRef, Primitive,
     };
     use proptest::prelude::*;
 
@@ -431,15 +489,16 @@ mod tests {
             while let Some((key, within, page)) = open.pop() {
                 let bounds = random_box(within, &mut rng);
                 let child_mask = if key.level() == 3 { 0 } else { rng.u8(..) };
+                let points = rng.u32(1..1000);
                 let mut node = Node {
                     key,
                     child_mask,
-                    points: rng.u32(1..1000),
+                    points,
                     bounds,
                     geometric_error: 0.0,
                     spacing: 0.0,
                     normal_cone: None,
-                    payloads: vec![],
+                    payloads: vec![PayloadRef { offset: 0, bytes: 5 * points, crc: 0 }],
                     child_page: None,
                 };
                 let below: Vec<_> = node
@@ -447,6 +506,10 @@ mod tests {
                     .filter_map(|child| Some((child, overlap(cube(child), bounds)?)))
                     .collect();
                 node.child_mask = below.iter().fold(0, |mask, (c, _)| mask | 1 << c.octant());
+                if !node.is_leaf() {
+                    // Odd trees may say that there is more error below.
+                    node.geometric_error = 16.0 * rng.f32() / f32::from(1u8 << key.level());
+                }
                 if key.level() == 1 && !node.is_leaf() {
                     node.child_page = Some(PageRef { offset: 0, bytes: 1, nodes: 1, crc: 0 });
                 }
@@ -530,8 +593,30 @@ mod tests {
         Optics::new(&View { camera, size_px: [640, 480] })
     }
 
+    const LIMITS: Limits = Limits {
+        point_budget: 8000,
+        min_size_px: 20.0,
+        culls_outside: true,
+        priority: Priority::ErrorPerByte,
+    };
+
+    /// Of a forest, wanting the only group.
+    fn selected(
+        trees: &mut [Option<Tree>],
+        optics: &Optics,
+        limits: Limits,
+        previous: &HashSet<NodeId>,
+    ) -> Selection {
+        let groups = vec![1; trees.len()];
+        select(trees, &groups, optics, limits, previous, None)
+    }
+
     fn keys(selection: &Selection) -> Vec<NodeKey> {
         selection.picks.iter().map(|pick| pick.id.key).collect()
+    }
+
+    fn priorities() -> impl Strategy<Value = Priority> {
+        prop_oneof![Just(Priority::ErrorPerByte), Just(Priority::Fraiss)]
     }
 
     fn refinements() -> impl Strategy<Value = Refinement> {
@@ -546,13 +631,13 @@ mod tests {
         #[test]
         fn loading_only_the_pages_asked_for_ends_with_the_selection_of_the_whole_tree(
             seed in any::<u64>(), refinement in refinements(), eye in place(), target in place(),
-            fov_y in 0.1..3.1, point_budget in 0u64..50_000, min_size_px in 1.0..100.0,
+            fov_y in 0.1..3.1, point_budget in 0u64..50_000, priority in priorities(), min_size_px in 1.0..100.0,
             first in prop::collection::vec(any::<prop::sample::Index>(), 0..3),
         ) {
             let forest = Forest::new(seed, refinement);
             let (optics, none) = (optics(eye, target, fov_y), HashSet::new());
-            let limits = Limits { point_budget, min_size_px, culls_outside: true };
-            let whole = select(&mut forest.tree(forest.pages.keys()), &optics, limits, &none);
+            let limits = Limits { point_budget, min_size_px, priority, ..LIMITS };
+            let whole = selected(&mut forest.tree(forest.pages.keys()), &optics, limits, &none);
             prop_assert!(whole.pages.is_empty());
             // Some pages are there already, from an earlier view.
             let mut all: Vec<_> = forest.pages.keys().copied().collect();
@@ -562,7 +647,7 @@ mod tests {
                 loaded.extend(first.iter().map(|index| all[index.index(all.len())]));
             }
             let found = loop {
-                let found = select(&mut forest.tree(&loaded), &optics, limits, &none);
+                let found = selected(&mut forest.tree(&loaded), &optics, limits, &none);
                 if found.pages.is_empty() {
                     break found;
                 }
@@ -575,12 +660,12 @@ mod tests {
         #[test]
         fn picks_keep_the_budget_and_come_after_their_parents(
             seed in any::<u64>(), refinement in refinements(), eye in place(), target in place(),
-            fov_y in 0.1..3.1, point_budget in 0u64..50_000,
+            fov_y in 0.1..3.1, point_budget in 0u64..50_000, priority in priorities(),
         ) {
             let forest = Forest::new(seed, refinement);
-            let limits = Limits { point_budget, min_size_px: 1.0, culls_outside: true };
+            let limits = Limits { point_budget, min_size_px: 1.0, priority, ..LIMITS };
             let mut trees = forest.tree(forest.pages.keys());
-            let selection = select(&mut trees, &optics(eye, target, fov_y), limits, &HashSet::new());
+            let selection = selected(&mut trees, &optics(eye, target, fov_y), limits, &HashSet::new());
             prop_assert!(selection.points <= point_budget);
             let picks = &selection.picks;
             for (index, pick) in picks.iter().enumerate() {
@@ -608,21 +693,26 @@ mod tests {
     fn a_small_motion_back_and_forth_changes_nothing() {
         let forest = Forest::new(SEED, Refinement::Additive);
         let mut trees = forest.tree(forest.pages.keys());
-        let mut swing = |point_budget, remember: bool| {
-            let limits = Limits { point_budget, min_size_px: 20.0, culls_outside: true };
+        let mut swing = |priority, side: f64, point_budget, remember: bool| {
+            let limits = Limits { point_budget, priority, ..LIMITS };
             let mut selections: Vec<HashSet<NodeId>> = vec![HashSet::new()];
             for step in 0..6 {
-                let eye = [128.0 + 4.0 * f64::from(step % 2), -400.0, 128.0];
+                let eye = [128.0 + side * f64::from(step % 2), -400.0, 128.0];
                 let previous = if remember { &selections[step as usize] } else { &selections[0] };
-                let selection = select(&mut trees, &optics(eye, [128.0; 3], 1.0), limits, previous);
+                let selection =
+                    selected(&mut trees, &optics(eye, [128.0; 3], 1.0), limits, previous);
                 selections.push(selection.picks.iter().map(|pick| pick.id).collect());
             }
             selections[2..].windows(2).filter(|pair| pair[0] != pair[1]).count()
         };
         let budgets = (2000..20_000).step_by(250);
-        let forgetful: usize = budgets.clone().map(|budget| swing(budget, false)).sum();
-        assert!(forgetful > 0, "without hysteresis, nodes come and go");
-        assert_eq!(budgets.map(|budget| swing(budget, true)).sum::<usize>(), 0);
+        for (priority, side) in [(Priority::ErrorPerByte, 32.0), (Priority::Fraiss, 4.0)] {
+            let mut swings = |remember| {
+                budgets.clone().map(|budget| swing(priority, side, budget, remember)).sum::<usize>()
+            };
+            assert!(swings(false) > 0, "without hysteresis, nodes come and go ({priority:?})");
+            assert_eq!(swings(true), 0, "{priority:?}");
+        }
     }
 
     #[test]
@@ -632,9 +722,9 @@ mod tests {
         huge.root_page.nodes[0].points = 1_000_000;
         let mut trees = forest.tree(forest.pages.keys());
         trees.insert(0, Some(Tree::new(Arc::new(huge))));
-        let limits = Limits { point_budget: 8000, min_size_px: 20.0, culls_outside: true };
+        let limits = LIMITS;
         let optics = optics([128.0, -400.0, 128.0], [128.0; 3], 1.0);
-        let selection = select(&mut trees, &optics, limits, &HashSet::new());
+        let selection = selected(&mut trees, &optics, limits, &HashSet::new());
         assert!(!selection.picks.is_empty());
         assert!(selection.picks.iter().all(|pick| pick.id.cloud == 1));
     }
@@ -642,10 +732,10 @@ mod tests {
     #[test]
     fn the_tree_of_these_tests_is_large() {
         let forest = Forest::new(SEED, Refinement::Additive);
-        let limits = Limits { point_budget: u64::MAX, min_size_px: 0.0, culls_outside: true };
+        let limits = Limits { point_budget: u64::MAX, min_size_px: 0.0, ..LIMITS };
         let optics = optics([128.0, -400.0, 128.0], [128.0; 3], 1.0);
         let mut trees = forest.tree(forest.pages.keys());
-        assert!(select(&mut trees, &optics, limits, &HashSet::new()).picks.len() > 50);
+        assert!(selected(&mut trees, &optics, limits, &HashSet::new()).picks.len() > 50);
     }
 
     #[test]
@@ -656,9 +746,9 @@ mod tests {
         boot.root_page.nodes[0].child_mask = 0;
         boot.root_page.nodes[0].bounds = LatticeBox { min: [7; 3], max: [7; 3] };
         forest.boot = Arc::new(boot);
-        let limits = Limits { point_budget: 8000, min_size_px: 50.0, culls_outside: true };
+        let limits = Limits { min_size_px: 50.0, ..LIMITS };
         let optics = optics([0.0, -1e6, 0.0], [7.0; 3], 1.0);
-        let selection = select(&mut forest.tree([]), &optics, limits, &HashSet::new());
+        let selection = selected(&mut forest.tree([]), &optics, limits, &HashSet::new());
         assert_eq!(keys(&selection), [NodeKey::ROOT]);
     }
 }

@@ -17,8 +17,8 @@ use tokio::{
 };
 
 use super::{
-    EngineError, EngineStats, FramePlan, View, config::EngineConfig, loader::Loader,
-    shared::Shared, traversal::Traversal,
+    DepthPyramid, EngineError, EngineStats, FramePlan, SplatReach, View, config::EngineConfig,
+    loader::Loader, occlusion::Drawn, shared::Shared, traversal::Traversal,
 };
 use crate::source::Source;
 
@@ -54,6 +54,15 @@ impl SimulatedEngine {
         let _entered = self.runtime.enter();
         let shared = &self.shared;
         shared.traversal.set_view(view, |generation| shared.start_phase(generation));
+    }
+
+    /// Tells of the picture that was drawn of a plan, now: as
+    /// [`Engine::set_depth`](super::Engine::set_depth).
+    pub fn set_depth(&mut self, plan: &FramePlan, depth: Arc<DepthPyramid>, reach: SplatReach) {
+        let _entered = self.runtime.enter();
+        if let Some(drawn) = Drawn::new(plan, depth, reach) {
+            self.shared.traversal.set_drawn(drawn);
+        }
     }
 
     /// Lets so much time pass and returns the newest plan.

@@ -147,6 +147,11 @@ impl Store {
         self.lost.contains(&id)
     }
 
+    /// Whether any piece can never be had.
+    pub fn has_lost(&self) -> bool {
+        !self.lost.is_empty()
+    }
+
     pub const fn pinned_bytes(&self) -> u64 {
         self.pinned_bytes
     }

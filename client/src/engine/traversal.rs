@@ -14,6 +14,7 @@ use super::{
     drawing::{self, Presence},
     event::Event,
     inbox::{Demand, TraversalMail},
+    occlusion::{Drawn, Occluders},
     piece::{NodeId, Part, Piece, PieceId},
     plan::{DrawNode, FramePlan},
     selection::{self, Limits, Pick, Selection},
@@ -39,6 +40,16 @@ pub(super) struct Traversal {
     selection: Selection,
     /// Nodes of the last view's selection, for hysteresis.
     previous: HashSet<NodeId>,
+    /// Whether depths are used at all.
+    occlusion: bool,
+    /// The newest picture of the view.
+    drawn: Option<Drawn>,
+    /// Nodes of the view that are not to be taken for hidden.
+    in_sight: HashSet<NodeId>,
+    /// What the newest plan draws.
+    shown: Vec<NodeId>,
+    /// Whether everything that the newest plan wants is there.
+    is_loaded: bool,
     sequence: u64,
 }
 
@@ -57,6 +68,7 @@ impl Traversal {
                 point_budget: config.point_budget,
                 min_size_px: config.min_size_px,
                 culls_outside: config.culls_outside,
+                priority: config.priority,
             },
             attributes: config.attributes.clone(),
             clouds: vec![Cloud::default(); clouds],
@@ -66,6 +78,11 @@ impl Traversal {
             view_generation: 0,
             selection: Selection::default(),
             previous: HashSet::new(),
+            occlusion: config.occlusion,
+            drawn: None,
+            in_sight: HashSet::new(),
+            shown: Vec::new(),
+            is_loaded: false,
             sequence: 0,
         }
     }
@@ -82,12 +99,34 @@ impl Traversal {
     }
 
     /// Takes in the news and tells what comes of it.
-    pub fn step(&mut self, mail: TraversalMail) {
+    pub fn step(&mut self, mut mail: TraversalMail) {
         let seen = mail.posted;
-        if self.read(mail) {
+        let drawn = mail.drawn.take();
+        let is_only_drawn = mail.events.is_empty()
+            && mail.attributes.is_none()
+            && mail.generation == self.view_generation;
+        let mut reselect = self.read(mail);
+        let is_new = drawn.is_some_and(|drawn| self.see(drawn));
+        if is_only_drawn && !is_new {
+            // A plan for a picture that is known would be drawn, and tell of that picture again.
+            return;
+        }
+        reselect |= is_new;
+        if reselect {
             self.select();
         }
         self.publish(seen);
+    }
+
+    /// Takes in a picture; returns whether it is news.
+    fn see(&mut self, drawn: Drawn) -> bool {
+        let is_of_view = Some(drawn.view) == self.view;
+        let is_new = self.drawn.as_ref().is_none_or(|last| !last.is_same(&drawn));
+        let is_news = self.occlusion && is_of_view && is_new;
+        if is_news {
+            self.drawn = Some(drawn);
+        }
+        is_news
     }
 
     /// Takes in the news; returns whether another selection may be wanted.
@@ -96,12 +135,16 @@ impl Traversal {
         if mail.view != self.view {
             self.previous = self.selection.picks.iter().map(|pick| pick.id).collect();
             self.view = mail.view;
+            self.drawn = None;
+            self.in_sight.clear();
             reselect = true;
         }
         self.view_generation = mail.generation;
         if let Some(attributes) = mail.attributes {
             self.attributes = attributes;
             (0..self.clouds.len()).for_each(|cloud| self.update_groups(cloud));
+            // Nodes are worth their bytes.
+            reselect = true;
         }
         for event in mail.events {
             match event {
@@ -127,6 +170,8 @@ impl Traversal {
                 Event::Group { node, group, decoded } => self.store.add(node, group, decoded),
                 Event::Lost { piece, message } => {
                     self.store.lose(piece);
+                    // Nothing is hidden any more: see `select`.
+                    reselect |= self.drawn.is_some();
                     self.shared.board.post(|news| news.add_problem(message));
                 }
             }
@@ -149,7 +194,17 @@ impl Traversal {
     fn select(&mut self) {
         let Some(view) = &self.view else { return };
         let optics = Optics::new(view);
-        self.selection = selection::select(&mut self.trees, &optics, self.limits, &self.previous);
+        let groups: Vec<_> = self.clouds.iter().map(|cloud| cloud.groups).collect();
+        // Where a node is lost, those above it may be drawn larger than its neighbours tell.
+        let drawn = self.drawn.as_ref().filter(|_| !self.store.has_lost());
+        let occluders = drawn.map(|drawn| Occluders {
+            drawn,
+            in_sight: &mut self.in_sight,
+            is_complete: self.is_loaded && drawn.is_of(self.shown.iter().copied()),
+        });
+        let (limits, previous) = (self.limits, &self.previous);
+        self.selection =
+            selection::select(&mut self.trees, &groups, &optics, limits, previous, occluders);
     }
 
     /// Publishes the plan for the selection and what is loaded, and asks for the rest.
@@ -192,7 +247,9 @@ impl Traversal {
         }
         let all_open =
             self.trees.iter().zip(&self.clouds).all(|(tree, cloud)| tree.is_some() || cloud.failed);
-        plan.settled = self.view.is_some() && all_open && pieces.is_empty();
+        self.shown = plan.nodes.iter().map(|n| NodeId { cloud: n.cloud, key: n.key }).collect();
+        self.is_loaded = self.view.is_some() && all_open && pieces.is_empty();
+        plan.settled = self.is_loaded && self.hides_rightly();
         // Per cloud, so that a host which does not answer keeps nothing from the others.
         let mut bytes = vec![0; self.clouds.len()];
         pieces.retain(|piece| {
@@ -212,6 +269,12 @@ impl Traversal {
         self.shared.clock(|clock| clock.note(&plan));
         self.shared.board.post(|news| news.plan = Arc::new(plan));
         self.shared.loader.set_demand(Demand { pieces, seen });
+    }
+
+    /// Whether what the selection leaves out as hidden is so behind what is drawn now.
+    fn hides_rightly(&self) -> bool {
+        let is_of = |drawn: &Drawn| drawn.is_of(self.shown.iter().copied());
+        self.selection.left_out.hidden.nodes == 0 || self.drawn.as_ref().is_some_and(is_of)
     }
 
     fn presence(&self, pick: &Pick) -> Presence {

@@ -6,7 +6,7 @@
 use glam::DVec3;
 use lodestream_protocol::{Lattice, LatticeBox};
 
-use crate::camera::{Camera, Projection};
+use crate::camera::{Camera, Projection, ViewBasis};
 
 /// Nodes just outside the picture are kept: their splats reach in.
 const MARGIN_PX: f64 = 8.0;
@@ -28,11 +28,25 @@ pub(crate) struct WorldBox {
     pub half: DVec3,
 }
 
+/// What a box can be seen in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Extent {
+    /// Lowest corner of the rectangle around the box in pixels: right of the middle of the picture,
+    /// and above it.
+    pub min: [f64; 2],
+    /// Highest corner.
+    pub max: [f64; 2],
+    /// Least distance along the view direction, world units.
+    pub nearest: f64,
+}
+
 /// A view, prepared for many boxes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Optics {
     eye: DVec3,
-    forward: DVec3,
+    basis: ViewBasis,
+    /// Half of width and height in pixels.
+    half_px: [f64; 2],
     /// A point `p` is inside where `normal · (p - eye) + distance >= 0` for all planes.
     planes: [(DVec3, f64); 5],
     lens: Lens,
@@ -96,7 +110,8 @@ impl Optics {
                 (planes, Lens::Orthographic { px_per_world, half_height })
             }
         };
-        Self { eye: view.camera.eye, forward: basis.forward, planes, lens }
+        let half_px = [0.5 * width, 0.5 * height];
+        Self { eye: view.camera.eye, basis, half_px, planes, lens }
     }
 
     /// Whether no part of the box can be in the picture. Boxes at the edge count as seen.
@@ -120,6 +135,62 @@ impl Optics {
         self.size_at(beyond.length(), radius)
     }
 
+    /// Pixels of the picture that the rectangle around the box takes up.
+    pub fn area(&self, bounds: &WorldBox) -> f64 {
+        let all = Extent { min: [f64::NEG_INFINITY; 2], max: [f64::INFINITY; 2], nearest: 0.0 };
+        let extent = self.extent(bounds).unwrap_or(all);
+        let side = |axis: usize| {
+            let half = self.half_px[axis];
+            (extent.max[axis].min(half) - extent.min[axis].max(-half)).max(0.0)
+        };
+        side(0) * side(1)
+    }
+
+    /// Where on the picture a box lies; `None` where a part of it is not in front of the eye.
+    pub fn extent(&self, bounds: &WorldBox) -> Option<Extent> {
+        let center = bounds.center - self.eye;
+        let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let mut nearest = f64::INFINITY;
+        for corner in 0..8 {
+            let sign = |axis: u8| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+            let at = center + bounds.half * DVec3::new(sign(0), sign(1), sign(2));
+            let distance = self.basis.forward.dot(at);
+            // False for NaN.
+            let in_front = distance > 0.0 && distance.is_finite();
+            if !in_front {
+                return None;
+            }
+            nearest = nearest.min(distance);
+            let scale = match self.lens {
+                Lens::Perspective { px_at_unit } => px_at_unit / distance,
+                Lens::Orthographic { px_per_world, .. } => px_per_world,
+            };
+            for (axis, direction) in [self.basis.right, self.basis.up].into_iter().enumerate() {
+                let px = direction.dot(at) * scale;
+                min[axis] = min[axis].min(px);
+                max[axis] = max[axis].max(px);
+            }
+        }
+        Some(Extent { min, max, nearest })
+    }
+
+    /// The box, as much larger as coordinates of its size and the eye's may be rounded.
+    pub fn with_rounding(&self, bounds: &WorldBox) -> WorldBox {
+        let largest = self.eye.abs().max(bounds.center.abs() + bounds.half);
+        WorldBox { half: bounds.half + 8.0 * f64::EPSILON * largest, ..*bounds }
+    }
+
+    /// Pixels that a world unit takes up where the box is nearest; around the eye, as at a hundredth
+    /// of the box's radius.
+    pub fn largest_scale(&self, bounds: &WorldBox) -> f64 {
+        let beyond = ((self.eye - bounds.center).abs() - bounds.half).max(DVec3::ZERO).length();
+        let scale = match self.lens {
+            Lens::Perspective { px_at_unit } => px_at_unit / beyond.max(0.01 * bounds.radius()),
+            Lens::Orthographic { px_per_world, .. } => px_per_world,
+        };
+        usable(scale, 0.0, 1e30)
+    }
+
     fn size_at(&self, distance: f64, radius: f64) -> f64 {
         let size = match self.lens {
             Lens::Perspective { .. } if distance <= radius || distance.is_nan() => f64::INFINITY,
@@ -141,13 +212,16 @@ impl Optics {
         let to_center = center - self.eye;
         let angle = match self.lens {
             // Fraiss 2017, eq. 3.3. Rounding takes the cosine of a node straight ahead above 1.
-            Lens::Perspective { .. } => {
-                self.forward.dot(to_center.normalize_or(self.forward)).clamp(-1.0, 1.0).acos()
-            }
+            Lens::Perspective { .. } => self
+                .basis
+                .forward
+                .dot(to_center.normalize_or(self.basis.forward))
+                .clamp(-1.0, 1.0)
+                .acos(),
             // Parallel rays have no angles: the offset from the axis stands in, measured so that
             // the upper edge of the picture is at 45 degrees.
             Lens::Orthographic { half_height, .. } => {
-                let across = to_center - self.forward.dot(to_center) * self.forward;
+                let across = to_center - self.basis.forward.dot(to_center) * self.basis.forward;
                 (across.length() / half_height).atan()
             }
         };
@@ -214,6 +288,21 @@ mod tests {
         assert!(lens.is_outside(&unit([0.0, -1.0, 0.0])));
     }
 
+    #[test]
+    fn a_box_takes_up_the_pixels_of_its_near_face_as_far_as_these_are_in_the_picture() {
+        let unit = |center: [f64; 3]| WorldBox { center: center.into(), half: DVec3::splat(0.5) };
+        // 250 pixels a unit at distance 1.
+        let area = perspective().area(&unit([0.0, 5.5, 0.0]));
+        assert!((area - 50.0 * 50.0).abs() < 1e-6, "{area}");
+        assert_eq!(perspective().area(&unit([0.0, 0.0, 0.0])), 500_000.0, "around the eye: all");
+        assert_eq!(perspective().area(&unit([99.0, 5.5, 0.0])), 0.0);
+        let orthographic = optics(Projection::Orthographic { height: 10.0 });
+        let area = orthographic.area(&unit([0.0, 99.0, 0.0]));
+        assert!((area - 50.0 * 50.0).abs() < 1e-6, "{area}");
+        let aside = orthographic.area(&unit([10.0, 99.0, 0.0]));
+        assert!((aside - 25.0 * 50.0).abs() < 1e-6, "half of it is in the picture: {aside}");
+    }
+
     fn any_number() -> impl Strategy<Value = f64> {
         prop_oneof![
             any::<f64>(),
@@ -250,6 +339,7 @@ mod tests {
             let largest = lens.largest_projected_size(&bounds, bounds.radius());
             prop_assert!(size >= 0.0 && largest >= 0.0);
             prop_assert!(lens.priority(center, size) >= 0.0);
+            prop_assert!(lens.area(&bounds) >= 0.0 && lens.largest_scale(&bounds) >= 0.0);
         }
 
         #[test]

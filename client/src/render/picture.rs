@@ -1,8 +1,8 @@
 //! A drawn picture.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
-use crate::render::RenderError;
+use crate::{engine::DepthPyramid, render::RenderError};
 
 /// Colours and depths, row by row from the upper left corner.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +23,13 @@ impl Picture {
     pub fn coverage(&self) -> f64 {
         let drawn = self.depth.iter().filter(|d| d.is_finite()).count();
         drawn as f64 / self.depth.len().max(1) as f64
+    }
+
+    /// What hides things in it, for [`Engine::set_depth`](crate::engine::Engine::set_depth); `None`
+    /// where there are not as many depths as pixels, or none.
+    #[must_use]
+    pub fn depth_pyramid(&self) -> Option<Arc<DepthPyramid>> {
+        DepthPyramid::new([self.width, self.height], &self.depth).map(Arc::new)
     }
 
     /// Reads the colours of a PNG file; nothing has a depth.

@@ -1,6 +1,7 @@
 //! What a picture is to look like.
 
 mod color;
+mod reach;
 mod shading;
 mod size;
 mod splat;
