@@ -53,6 +53,9 @@ pub struct EvalArgs {
         default_value = "20mbit/40ms,100mbit/20ms,4mbit/100ms/1%"
     )]
     pub links: Vec<LinkSpec>,
+    /// Camera paths to follow without waiting: files or generators, as in `shot --path`
+    #[arg(long, value_name = "PATH,…", value_delimiter = ',')]
+    pub paths: Vec<String>,
     /// Distances to look from
     #[arg(long, value_name = "SIZE,…", value_delimiter = ',', default_value = "near,medium,far")]
     pub sizes: Vec<ViewSize>,
@@ -103,6 +106,8 @@ pub fn run(args: EvalArgs) -> anyhow::Result<ExitCode> {
         splats: args.splats.clone(),
         policies: args.policies.clone(),
         links: args.links.clone(),
+        paths: args.paths.clone(),
+        path_frames: 12,
         views: args.sizes.clone(),
         size_px: [args.width, (args.width * 9).div_ceil(16)],
         samples: 4,
@@ -116,6 +121,7 @@ pub fn run(args: EvalArgs) -> anyhow::Result<ExitCode> {
         config.budgets.truncate(2);
         config.links.truncate(1);
         config.runs = 2;
+        config.path_frames = 4;
     }
     let cancel = cancel_on_interrupt()?;
     let start = std::time::Instant::now();
@@ -138,7 +144,8 @@ pub fn run(args: EvalArgs) -> anyhow::Result<ExitCode> {
 fn command() -> String {
     let quoted = |argument: String| {
         let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=%".contains(c);
-        if argument.chars().all(plain) { argument } else { format!("'{argument}'") }
+        let is_plain = !argument.is_empty() && argument.chars().all(plain);
+        if is_plain { argument } else { format!("'{}'", argument.replace('\'', r"'\''")) }
     };
     let arguments = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned()));
     let arguments: Vec<_> = arguments.collect();
@@ -156,15 +163,27 @@ fn compare(before: &Path, after: &Path) -> anyhow::Result<ExitCode> {
         }
         Ok(report)
     };
-    let (differences, missing) = eval::compare(&read(before)?, &read(after)?);
+    let (earlier, later) = (read(before)?, read(after)?);
+    let settings = |report: &Report| {
+        let [width, height] = report.size_px;
+        let (samples, seed) = (report.samples, report.seed);
+        format!("{width} x {height} pixels, {samples} x {samples} samples, seed {seed}")
+    };
+    let [ours, theirs] = [&later, &earlier].map(settings);
+    if ours != theirs {
+        let [after, before] = [after, before].map(Path::display);
+        anyhow::bail!("{after}: of {ours}, but {before}: of {theirs}; evaluate both alike");
+    }
+    let (differences, missing) = eval::compare(&earlier, &later);
     let mut text = String::new();
     for difference in &differences {
         let mark = if difference.is_regression { "WORSE" } else { "" };
         let (what, before, after) = (&difference.what, difference.before, difference.after);
-        text += &format!(
-            "{mark:5} {what}: {before:.5} -> {after:.5} ({:+.1} %)\n",
-            100.0 * (after / before - 1.0)
-        );
+        let change = match before {
+            0.0 => "from nothing".to_owned(),
+            _ => format!("{:+.1} %", 100.0 * (after - before) / before.abs()),
+        };
+        text += &format!("{mark:5} {what}: {before:.5} -> {after:.5} ({change})\n");
     }
     for what in &missing {
         text += &format!("GONE  {what}\n");

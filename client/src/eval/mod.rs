@@ -4,11 +4,13 @@
 //! - `subject.rs`: a dataset and the truth of any view of it;
 //! - `frame.rs`: milliseconds per frame and error;
 //! - `stream.rs`: error over time while a view streams in;
+//! - `along.rs`: error along a camera path, without waiting;
 //! - `left_out.rs`: what a view does without, and what that saves;
 //! - `curve.rs`: areas under curves, times to a quality, bytes at equal error, Pareto fronts;
 //! - `run.rs`: all of it, for `lodestream eval`;
 //! - `report.rs`, `page.rs`: what was found, for programs and for people; `compare.rs`: two of them.
 
+mod along;
 mod compare;
 mod curve;
 mod frame;
@@ -20,6 +22,7 @@ mod stream;
 mod subject;
 mod views;
 
+pub use along::{Instant, PathRun, PathSample, instants};
 pub use compare::{Difference, compare};
 pub use curve::{Reached, Sample, area, bytes_at_equal_error, pareto, reached};
 pub use frame::FrameRow;

@@ -23,6 +23,9 @@ pub fn page(report: &Report, exhibits: &[Exhibit]) -> Page {
     let mut sections = vec![answer(report)];
     for subject in &report.subjects {
         sections.push(streams(subject));
+        if !subject.paths.is_empty() {
+            sections.push(paths(subject));
+        }
         sections.push(frames(subject));
         sections.push(left_out(subject));
     }
@@ -174,8 +177,8 @@ fn answer(report: &Report) -> Section {
         lead: "Seconds since the view was set until the picture is as similar to the truth as the \
                heading says, and stays so; “error x time” is the area between the curve and 1 until \
                the slowest is done, in seconds; “bytes at equal error” are against potree. Times are \
-               those of the link: simulated, so that they repeat to the last digit. “Bound” is two \
-               round trips and the bytes' transmission."
+               those of the link: simulated, so that they repeat to the last digit. “Bound” is the \
+               bytes' transmission and two round trips, one after a jump."
             .into(),
         body: table.markup(),
     }
@@ -225,6 +228,67 @@ fn streams(subject: &SubjectReport) -> Section {
                come."
             .into(),
         body: html! { div.plots { @for plot in plots { (plot) } } },
+    }
+}
+
+fn paths(subject: &SubjectReport) -> Section {
+    let mut table = Table::new(&[
+        ("path", Align::Word),
+        ("link", Align::Word),
+        ("policy", Align::Word),
+        ("mean SSIM", Align::Number),
+        ("worst SSIM", Align::Number),
+        ("popping", Align::Number),
+        ("MB", Align::Number),
+        ("requests", Align::Number),
+        ("broken off", Align::Number),
+    ]);
+    let mut plots: Vec<Plot> = Vec::new();
+    for run in &subject.paths {
+        let own = run.policy == Policy::Ours;
+        table.rows.push(vec![
+            run.path.as_str().into(),
+            run.link.as_str().into(),
+            Cell::Chip(run.policy.name().into(), if own { Tone::Good } else { Tone::Plain }),
+            format!("{:.4}", run.mean_ssim).into(),
+            format!("{:.4}", run.worst_ssim).into(),
+            run.popping_rms.map_or("-".into(), |rms| Cell::from(format!("{rms:.2}"))),
+            format!("{:.2}", run.bytes as f64 / 1e6).into(),
+            run.requests.to_string().into(),
+            run.cancelled.to_string().into(),
+        ]);
+        let series = Series {
+            name: run.policy.name().into(),
+            color: policy_color(run.policy),
+            points: run.samples.iter().map(|s| (s.seconds, s.ssim)).collect(),
+            mark: Mark::Line,
+        };
+        let title = format!("{} by {}", run.path, run.link);
+        match plots.iter_mut().find(|plot| plot.title == title) {
+            Some(plot) => plot.series.push(series),
+            None => plots.push(Plot {
+                title,
+                x: "seconds".into(),
+                y: "SSIM".into(),
+                x_scale: Scale::Linear,
+                y_range: None,
+                levels: LEVELS.to_vec(),
+                marks: Vec::new(),
+                series: vec![series],
+            }),
+        }
+    }
+    Section {
+        anchor: format!("{}-paths", anchor(&subject.name)),
+        title: format!("{}: along camera paths", subject.name),
+        lead: "What a visitor sees who does not wait: similarity to the truth from the same place while \
+               the camera moves. Popping is what changes from one picture to the next beyond what \
+               the truth changes, root mean square of 0 to 255."
+            .into(),
+        body: html! {
+            div.plots { @for plot in &plots { (plot.markup()) } }
+            (table.markup())
+        },
     }
 }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
+    along::PathRun,
     curve::{area, bytes_at_equal_error},
     frame::FrameRow,
     left_out::{NotStored, SavingRow},
@@ -50,6 +51,8 @@ pub struct SubjectReport {
     pub frames: Vec<FrameRow>,
     /// Run by run.
     pub streams: Vec<StreamRun>,
+    /// Path by path.
+    pub paths: Vec<PathRun>,
     /// What the file does without.
     pub not_stored: NotStored,
     /// Saving by saving.
@@ -162,6 +165,7 @@ impl Report {
             ("frame.csv", self.frame_csv()),
             ("stream.csv", self.stream_csv()),
             ("stream_samples.csv", self.samples_csv()),
+            ("path.csv", self.path_csv()),
             ("left_out.csv", self.left_out_csv()),
         ]
     }
@@ -268,6 +272,34 @@ impl Report {
                         number(sample.ssim),
                         number(sample.mse),
                         number(sample.holes),
+                    ]);
+                }
+            }
+        })
+    }
+
+    fn path_csv(&self) -> String {
+        let header = "dataset path link policy seconds ssim points bytes mean_ssim worst_ssim \
+                      popping_rms requests cancelled";
+        table(header, |line| {
+            for (subject, run) in
+                self.subjects.iter().flat_map(|s| s.paths.iter().map(move |r| (s, r)))
+            {
+                for sample in &run.samples {
+                    line(vec![
+                        subject.name.clone(),
+                        run.path.clone(),
+                        run.link.clone(),
+                        run.policy.name().into(),
+                        number(sample.seconds),
+                        number(sample.ssim),
+                        sample.points.to_string(),
+                        sample.bytes.to_string(),
+                        number(run.mean_ssim),
+                        number(run.worst_ssim),
+                        optional(run.popping_rms),
+                        run.requests.to_string(),
+                        run.cancelled.to_string(),
                     ]);
                 }
             }

@@ -13,7 +13,7 @@ use serde::Deserialize;
 use wait4::Wait4;
 
 use super::{
-    frame, left_out,
+    along, frame, left_out,
     report::{BuildRow, NoiseRow, Report, SubjectReport},
     stream::{Stop, Streaming},
     subject::Subject,
@@ -22,6 +22,7 @@ use super::{
 use crate::{
     engine::{EngineConfig, Policy},
     metrics::{PictureError, ssim_map},
+    path::{Extent, PathSource},
     render::{Picture, RenderSettings, Splat, SplatSize},
     report::machine,
     source::LinkSpec,
@@ -52,6 +53,10 @@ pub struct EvalConfig {
     pub policies: Vec<Policy>,
     /// Links to fetch by.
     pub links: Vec<LinkSpec>,
+    /// Camera paths to follow: files or generators, as `shot --path` takes them.
+    pub paths: Vec<String>,
+    /// Instants of a path at which pictures are compared.
+    pub path_frames: u32,
     /// Distances to look from.
     pub views: Vec<ViewSize>,
     /// Of the pictures.
@@ -86,11 +91,21 @@ pub fn run(
     cancel: &AtomicBool,
     say: &dyn Fn(&str),
 ) -> anyhow::Result<(Report, Vec<Exhibit>)> {
-    let (mut subjects, mut exhibits) = (Vec::new(), Vec::new());
     let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
+    // All of them first: a wrong one is told before the long work begins.
+    let mut opened: Vec<(Subject, Option<BuildRow>)> = Vec::new();
     for input in &config.inputs {
-        let (path, build) = dataset(input, config, scratch.path(), say)?;
-        let subject = Subject::open(&path)?;
+        for (path, build) in datasets(input, config, scratch.path(), opened.len(), say)? {
+            let mut subject = Subject::open(&path)?;
+            if let Some(build) = build.as_ref().filter(|_| config.methods.len() > 1) {
+                subject.name = format!("{} {}", subject.name, build.method);
+            }
+            subject.name = unique(&subject.name, opened.iter().map(|(other, _)| &*other.name));
+            opened.push((subject, build));
+        }
+    }
+    let (mut subjects, mut exhibits) = (Vec::new(), Vec::new());
+    for (subject, build) in opened {
         subjects.push(evaluate(&subject, build, config, cancel, say, &mut exhibits)?);
     }
     let report = Report {
@@ -115,29 +130,48 @@ struct BuildReport {
     bytes: u64,
 }
 
-/// The dataset that `input` is, or that is built from it by the program itself, in a process of its
-/// own: whose memory is the build's.
-fn dataset(
+/// The name, with a number behind it where another is so named.
+fn unique<'a>(name: &str, others: impl Iterator<Item = &'a str> + Clone) -> String {
+    let numbered = (2_u32..).map(|number| format!("{name} {number}"));
+    let mut names = std::iter::once(name.to_owned()).chain(numbered);
+    let free = names.find(|name| others.clone().all(|other| other != name));
+    free.unwrap_or_else(|| name.to_owned())
+}
+
+/// The dataset that `input` is, or those that are built from it, one for each method.
+fn datasets(
     input: &str,
     config: &EvalConfig,
     scratch: &Path,
+    first: usize,
     say: &dyn Fn(&str),
-) -> anyhow::Result<(PathBuf, Option<BuildRow>)> {
+) -> anyhow::Result<Vec<(PathBuf, Option<BuildRow>)>> {
     let path = Path::new(input);
     if path.extension().is_some_and(|ending| ending == "lods") {
-        return Ok((path.to_owned(), None));
+        return Ok(vec![(path.to_owned(), None)]);
     }
-    let method = config.methods.first().map_or("poisson", String::as_str);
-    say(&format!("{input}: build"));
     let stem = match input.strip_prefix("sim:") {
-        Some(scene) => scene.split('?').next().unwrap_or(scene).to_owned(),
-        None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        Some(scene) => scene.split('?').next().unwrap_or(scene).into(),
+        None => path.file_stem().map_or("dataset".into(), |stem| stem.to_string_lossy()),
     };
-    let (output, report) = (scratch.join(stem + ".lods"), scratch.join("build.json"));
+    let build_one = |(index, method): (usize, &String)| {
+        // Inputs of one name lie apart.
+        let folder = scratch.join((first + index).to_string());
+        std::fs::create_dir(&folder).context("cannot make a temporary folder")?;
+        say(&format!("{input}: build, {method}"));
+        let output = folder.join(format!("{stem}.lods"));
+        let row = build(input, method, &output, &folder.join("build.json"))?;
+        Ok((output, Some(row)))
+    };
+    config.methods.iter().enumerate().map(build_one).collect()
+}
+
+/// Builds by the program itself, in a process of its own: whose memory is the build's.
+fn build(input: &str, method: &str, output: &Path, report: &Path) -> anyhow::Result<BuildRow> {
     let program = std::env::current_exe().context("this program cannot be found again")?;
     let mut command = Command::new(program);
-    command.arg("build").arg(input).arg("-o").arg(&output).args(["--method", method]);
-    command.arg("--report").arg(&report).stdin(std::process::Stdio::null());
+    command.arg("build").arg(input).arg("-o").arg(output).args(["--method", method]);
+    command.arg("--report").arg(report).stdin(std::process::Stdio::null());
     command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
     let start = Instant::now();
     let mut child = command.spawn().context("the build cannot be started")?;
@@ -152,7 +186,7 @@ fn dataset(
         let last = text.lines().last().unwrap_or("it says nothing").trim_start_matches("error: ");
         anyhow::bail!("{last}");
     }
-    let json = std::fs::read_to_string(&report).context("the build's report cannot be read")?;
+    let json = std::fs::read_to_string(report).context("the build's report cannot be read")?;
     let told: BuildReport = serde_json::from_str(&json)?;
     let row = BuildRow {
         method: method.into(),
@@ -163,7 +197,7 @@ fn dataset(
         points_in: told.points_read,
         points_out: told.points,
     };
-    Ok((output, Some(row)))
+    Ok(row)
 }
 
 fn evaluate(
@@ -198,7 +232,8 @@ fn evaluate(
         say(&format!("{name}: truth of the {} view", stop.name));
         let settings = settings(stop.camera);
         let truth = subject.truth(&settings, config.samples, config.seed, cancel)?;
-        let other = subject.truth(&settings, config.samples, config.seed + 1, cancel)?;
+        let other =
+            subject.truth(&settings, config.samples, config.seed.wrapping_add(1), cancel)?;
         let error = PictureError::between(&other, &truth)?;
         noise.push(NoiseRow {
             view: stop.name.clone(),
@@ -275,10 +310,30 @@ fn evaluate(
         }
     }
 
+    let mut paths = Vec::new();
+    for text in &config.paths {
+        let path = PathSource::open(text)?.path(&Extent::of(&subject.clouds)?)?;
+        let mut seen = Vec::new();
+        for (seconds, camera) in along::instants(&path, config.path_frames) {
+            say(&format!("{name}: truth along {text}, {seconds:.1} s"));
+            let truth = subject.truth(&settings(camera), config.samples, config.seed, cancel)?;
+            seen.push(along::Instant { seconds, camera, truth });
+        }
+        for &link in &config.links {
+            for &policy in &config.policies {
+                say(&format!("{name}: along {text} by {link}, {}", policy.name()));
+                paths.push(streaming.follow(text, &path, &seen, link, policy)?);
+            }
+        }
+    }
+
     say(&format!("{name}: what is left out"));
     let link = config.links.first().copied();
     let saved = match link {
-        Some(link) => left_out::savings(subject, &base, &streaming.config, &stops, link, cancel)?,
+        Some(link) => {
+            let (engine, seed) = (&streaming.config, config.seed);
+            left_out::savings(subject, &base, engine, &stops, link, seed, cancel)?
+        }
         None => Vec::new(),
     };
     Ok(SubjectReport {
@@ -289,6 +344,7 @@ fn evaluate(
         noise,
         frames,
         streams,
+        paths,
         not_stored: left_out::not_stored(subject, &base),
         left_out: saved,
     })

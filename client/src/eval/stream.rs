@@ -62,8 +62,8 @@ pub struct StreamRun {
     pub ssim: f64,
     /// When each of [`LEVELS`] was reached, for good.
     pub reached: Vec<Option<Reached>>,
-    /// Least milliseconds for the bytes that the complete picture took: two round trips and their
-    /// transmission.
+    /// Least milliseconds for the bytes that the complete picture took: their transmission and two
+    /// round trips; one after a jump, when the connection stands; 0 where nothing had to come.
     pub bound_ms: f64,
     /// At the steps at which the picture changed.
     pub samples: Vec<Sample>,
@@ -87,6 +87,15 @@ pub struct Streaming<'a> {
     pub samples: u32,
     /// Asked for between two steps.
     pub cancel: &'a AtomicBool,
+}
+
+/// Whether two plans draw the same nodes with the same columns, in the same order.
+fn draws_the_same(a: &FramePlan, b: &FramePlan) -> bool {
+    a.nodes.len() == b.nodes.len()
+        && a.nodes
+            .iter()
+            .zip(&b.nodes)
+            .all(|(a, b)| (a.cloud, a.key) == (b.cloud, b.key) && Arc::ptr_eq(&a.points, &b.points))
 }
 
 impl Streaming<'_> {
@@ -113,7 +122,12 @@ impl Streaming<'_> {
             let mut run = self.stop(&mut engine, stop, truth)?;
             run.link = link.to_string();
             run.policy = policy;
-            run.bound_ms = link.bound(run.bytes).as_secs_f64() * 1e3;
+            let bound = match runs.len() {
+                0 => link.bound(run.bytes),
+                _ if run.bytes == 0 => Duration::ZERO,
+                _ => link.bound(run.bytes).saturating_sub(link.round_trip),
+            };
+            run.bound_ms = bound.as_secs_f64() * 1e3;
             run.from = std::mem::replace(&mut from, stop.name.clone());
             runs.push(run);
         }
@@ -130,7 +144,7 @@ impl Streaming<'_> {
         engine.set_view(View { camera: stop.camera, size_px: settings.size_px });
         let start = engine.time();
         let mut samples: Vec<Sample> = Vec::new();
-        let mut seen: Vec<(usize, lodestream_protocol::NodeKey)> = Vec::new();
+        let mut seen: Option<Arc<FramePlan>> = None;
         let mut plan: Arc<FramePlan>;
         // At time 0 too: what is there from before counts.
         let mut step = Duration::ZERO;
@@ -143,10 +157,8 @@ impl Streaming<'_> {
             if let Some(problem) = engine.stats().problems.first() {
                 anyhow::bail!("{problem}");
             }
-            let nodes: Vec<_> = plan.nodes.iter().map(|node| (node.cloud, node.key)).collect();
             let totals = engine.stats().since_view.totals;
-            if nodes != seen || samples.is_empty() {
-                seen = nodes;
+            if seen.is_none_or(|seen| !draws_the_same(&seen, &plan)) {
                 let error = self.error(&plan, &settings, truth)?;
                 samples.push(Sample {
                     ms: (engine.time() - start).as_secs_f64() * 1e3,
@@ -158,6 +170,7 @@ impl Streaming<'_> {
                     holes: error.coverage.holes.of_covered.unwrap_or(0.0),
                 });
             }
+            seen = Some(Arc::clone(&plan));
             if plan.settled || engine.time() - start >= self.patience {
                 break;
             }
@@ -185,7 +198,16 @@ impl Streaming<'_> {
         settings: &RenderSettings,
         truth: &Picture,
     ) -> anyhow::Result<PictureError> {
-        // As finely as the truth: what is left is the error of what is drawn, not of the pixels.
+        Ok(PictureError::between(&self.picture(plan, settings)?, truth)?)
+    }
+
+    /// What a plan draws, as finely as the truth: what is left is the error of what is drawn, not of
+    /// the pixels.
+    pub(super) fn picture(
+        &self,
+        plan: &FramePlan,
+        settings: &RenderSettings,
+    ) -> anyhow::Result<Picture> {
         let tree = VisibleTree::of(plan.nodes.iter().map(|n| (n.cloud, n.key, n.spacing)));
         let clouds = &self.subject.clouds;
         let renderer = TruthRenderer::new(settings, clouds, tree, self.samples)?;
@@ -198,7 +220,6 @@ impl Streaming<'_> {
                 renderer.add_node(node.clone())?;
             }
         }
-        let picture = renderer.finish()?.picture;
-        Ok(PictureError::between(&picture, truth)?)
+        Ok(renderer.finish()?.picture)
     }
 }
