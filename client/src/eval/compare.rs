@@ -2,9 +2,13 @@
 //!
 //! Errors, bytes and simulated times are the same to the last digit in every run, so that any loss
 //! of theirs beyond a small allowance counts. Times of the machine count beyond the spread that both
-//! reports tell of themselves.
+//! reports tell of themselves, and only where both are of one machine.
 
-use super::report::{Report, SubjectReport};
+use super::{
+    curve::area,
+    report::{Report, SubjectReport},
+    stream::StreamRun,
+};
 
 /// Similarity that may be lost: what rounding on another processor may move.
 const SSIM_ALLOWANCE: f64 = 1e-4;
@@ -28,13 +32,15 @@ pub struct Difference {
     pub is_regression: bool,
 }
 
-/// What differs; and what is in only one of the two, by name.
+/// What differs; and what the earlier has and the later lacks, by name. Both have to be of pictures
+/// of one size with the same samples.
 #[must_use]
 pub fn compare(before: &Report, after: &Report) -> (Vec<Difference>, Vec<String>) {
     let (mut differences, mut missing) = (Vec::new(), Vec::new());
+    let is_one_machine = before.machine == after.machine;
     for old in &before.subjects {
         match after.subjects.iter().find(|new| new.name == old.name) {
-            Some(new) => subject(old, new, &mut differences, &mut missing),
+            Some(new) => subject(old, new, is_one_machine, &mut differences, &mut missing),
             None => missing.push(old.name.clone()),
         }
     }
@@ -44,6 +50,7 @@ pub fn compare(before: &Report, after: &Report) -> (Vec<Difference>, Vec<String>
 fn subject(
     old: &SubjectReport,
     new: &SubjectReport,
+    is_one_machine: bool,
     differences: &mut Vec<Difference>,
     missing: &mut Vec<String>,
 ) {
@@ -62,11 +69,14 @@ fn subject(
             missing.push(name);
             continue;
         };
-        if let Some((x, y)) = a.error.ssim.zip(b.error.ssim) {
-            note(format!("{name} ssim"), x, y, y < x - SSIM_ALLOWANCE);
+        match (a.error.ssim, b.error.ssim) {
+            (Some(x), Some(y)) => note(format!("{name} ssim"), x, y, y < x - SSIM_ALLOWANCE),
+            (Some(_), None) => missing.push(format!("{name} ssim")),
+            (None, _) => {}
         }
         let spread = a.ms_spread.max(b.ms_spread) - 1.0;
-        note(format!("{name} ms"), a.ms, b.ms, grown(a.ms, b.ms, spread + TIME_ALLOWANCE));
+        let is_slower = is_one_machine && grown(a.ms, b.ms, spread + TIME_ALLOWANCE);
+        note(format!("{name} ms"), a.ms, b.ms, is_slower);
     }
     let (races, others) = (old.races(), new.races());
     for race in &races {
@@ -94,7 +104,11 @@ fn subject(
                 b.run.ssim,
                 b.run.ssim < a.run.ssim - SSIM_ALLOWANCE,
             );
-            note(format!("{name} area"), a.area, b.area, grown(a.area, b.area, GROWTH_ALLOWANCE));
+            // To the same end: that of the race hangs on the slowest rival.
+            let end = |run: &StreamRun| run.samples.last().map_or(0.0, |sample| sample.ms);
+            let horizon = end(a.run).max(end(b.run));
+            let [x, y] = [a.run, b.run].map(|run| area(&run.samples, horizon));
+            note(format!("{name} area"), x, y, grown(x, y, GROWTH_ALLOWANCE));
             let bytes = [a.run.bytes as f64, b.run.bytes as f64];
             note(
                 format!("{name} bytes"),
@@ -102,8 +116,12 @@ fn subject(
                 bytes[1],
                 grown(bytes[0], bytes[1], GROWTH_ALLOWANCE),
             );
-            if let Some((x, y)) = a.run.settled_ms.zip(b.run.settled_ms) {
-                note(format!("{name} settled_ms"), x, y, grown(x, y, GROWTH_ALLOWANCE));
+            match (a.run.settled_ms, b.run.settled_ms) {
+                (Some(x), Some(y)) => {
+                    note(format!("{name} settled_ms"), x, y, grown(x, y, GROWTH_ALLOWANCE));
+                }
+                (Some(_), None) => missing.push(format!("{name} settled_ms")),
+                (None, _) => {}
             }
         }
     }

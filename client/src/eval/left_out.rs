@@ -102,16 +102,17 @@ pub fn savings(
     config: &EngineConfig,
     stops: &[Stop],
     link: LinkSpec,
+    seed: u64,
     cancel: &AtomicBool,
 ) -> anyhow::Result<Vec<SavingRow>> {
     let mut rows = Vec::new();
     for stop in stops {
         let settings = RenderSettings { camera: stop.camera, ..*settings };
-        let (with, left_out) = cost(subject, &settings, config.clone(), link, cancel)?;
+        let (with, left_out) = cost(subject, &settings, config.clone(), link, seed, cancel)?;
         for (saving, switch_off, told) in SAVINGS {
             let mut changed = config.clone();
             switch_off(&mut changed, subject);
-            let (without, _) = cost(subject, &settings, changed, link, cancel)?;
+            let (without, _) = cost(subject, &settings, changed, link, seed, cancel)?;
             let told = told(&left_out);
             rows.push(SavingRow {
                 view: stop.name.clone(),
@@ -131,9 +132,10 @@ fn cost(
     settings: &RenderSettings,
     config: EngineConfig,
     link: LinkSpec,
+    seed: u64,
     cancel: &AtomicBool,
 ) -> anyhow::Result<(Cost, LeftOut)> {
-    let source = Source::linked(subject.file()?, Link::new(link, 0));
+    let source = Source::linked(subject.file()?, Link::new(link, seed));
     let mut engine = SimulatedEngine::start(vec![source], config)?;
     engine.set_view(View { camera: settings.camera, size_px: settings.size_px });
     let plan = loop {

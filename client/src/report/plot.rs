@@ -173,23 +173,35 @@ impl Axis {
     }
 
     fn ticks(&self) -> Vec<f64> {
-        let (first, step) = match self.scale {
-            Scale::Linear => {
-                let rough = (self.high - self.low) / 5.0;
-                let unit = 10_f64.powf(rough.log10().floor());
-                let times = [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().find(|t| t * unit >= rough);
-                let step = times.unwrap_or(10.0) * unit;
-                ((self.low / step).ceil(), step)
-            }
-            Scale::Logarithmic => (self.low.ceil(), 1.0),
-        };
-        let steps = (0..40).map(|i| (first + f64::from(i)) * step);
-        let ticks = steps.take_while(|tick| *tick <= self.high + 1e-9 * step);
         match self.scale {
-            Scale::Linear => ticks.collect(),
-            Scale::Logarithmic => ticks.map(|tick| 10_f64.powf(tick)).collect(),
+            Scale::Linear => even_ticks(self.low, self.high),
+            // As few as tell the scale.
+            Scale::Logarithmic => [&[1.0][..], &[1.0, 2.0, 5.0]]
+                .into_iter()
+                .map(|mantissas| self.power_ticks(mantissas))
+                .find(|ticks| ticks.len() >= 3)
+                .unwrap_or_else(|| even_ticks(10_f64.powf(self.low), 10_f64.powf(self.high))),
         }
     }
+
+    /// Powers of ten times each of `mantissas`.
+    fn power_ticks(&self, mantissas: &[f64]) -> Vec<f64> {
+        let powers = (0..40).map(|power| 10_f64.powf(self.low.floor() + f64::from(power)));
+        let ticks = powers.flat_map(|power| mantissas.iter().map(move |m| m * power));
+        let inside = |tick: &f64| (self.low - 1e-9..=self.high + 1e-9).contains(&tick.log10());
+        ticks.filter(inside).collect()
+    }
+}
+
+/// Some five round numbers.
+fn even_ticks(low: f64, high: f64) -> Vec<f64> {
+    let rough = (high - low) / 5.0;
+    let unit = 10_f64.powf(rough.log10().floor());
+    let times = [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().find(|t| t * unit >= rough);
+    let step = times.unwrap_or(10.0) * unit;
+    let first = (low / step).ceil();
+    let ticks = (0..40).map(|i| (first + f64::from(i)) * step);
+    ticks.take_while(|tick| *tick <= high + 1e-9 * step).collect()
 }
 
 /// As short as it can be told: `0.95`, `1.5k`, `20M`.
@@ -222,6 +234,14 @@ mod tests {
         let found = axis([3e4, 2e7], Scale::Logarithmic).ticks();
         assert_eq!(found, [1e5, 1e6, 1e7]);
         assert_eq!(axis([f64::NAN, f64::NAN], Scale::Linear).ticks().len(), 6);
+    }
+
+    #[test]
+    fn a_logarithmic_axis_within_a_power_of_ten_has_ticks_too() {
+        assert_eq!(axis([4.0, 23.0], Scale::Logarithmic).ticks(), [5.0, 10.0, 20.0]);
+        assert_eq!(axis([3.0, 4.0], Scale::Logarithmic).ticks().len(), 6);
+        let equal = axis([7.0, 7.0], Scale::Logarithmic).ticks();
+        assert!(equal.len() >= 3 && equal.iter().all(|t| (6.9..71.0).contains(t)), "{equal:?}");
     }
 
     #[test]
