@@ -14,6 +14,13 @@
 //! - Only nodes of additive clouds are left out. Where children stand in for their parent, the parent
 //!   may itself hide them, and would for good.
 //!
+//! A simulated courtyard of 4 M points from six places in and around its house (960 x 540, circles, no
+//! bound of points), against all that is in the picture. Sizes of 1.6 spacings of their level: 5 % of the
+//! bytes less in a room with open doors, 14 to 40 % elsewhere (at a door, 7.9 MB become 4.8, 1.6 M points
+//! 0.9 M, 3.4 s on 20 Mbit/s 2.2 s). Sizes of three pixels: 0 to 8 %. Sizes of 1.6 spacings of the finest node:
+//! nothing, of 3 spacings up to 5 %. Large coarse splats close the walls that small fine ones leave holes
+//! in, and where there is a hole, something may be seen through it.
+//!
 //! It comes to an end: a node that is not hidden by the depths of a plan for which all is loaded is
 //! never again taken for hidden in that view. So every further plan of the view has one hidden node
 //! less, or is the last.
@@ -89,10 +96,8 @@ fn in_order(nodes: impl Iterator<Item = NodeId>) -> Vec<NodeId> {
 /// A node that may be hidden.
 pub(super) struct Suspect {
     pub id: NodeId,
-    /// Holds its points and those of all nodes below.
+    /// Holds all points of its cube: its own, those of the nodes below and those of the nodes above.
     pub bounds: WorldBox,
-    /// Holds the points of all nodes above that lie where it is.
-    pub octant: WorldBox,
     /// Between its points, world units.
     pub spacing: f64,
     /// Of the node above.
@@ -123,11 +128,9 @@ impl Occluders<'_> {
 
     fn is_behind(&self, optics: &Optics, suspect: &Suspect) -> bool {
         let reach = &self.drawn.reach;
-        let (bounds, spacing) = if reach.is_adaptive {
-            (suspect.octant, suspect.spacing.max(suspect.spacing_above))
-        } else {
-            (suspect.bounds, suspect.spacing)
-        };
+        let spacing_above = if reach.is_adaptive { suspect.spacing_above } else { 0.0 };
+        let spacing = suspect.spacing.max(spacing_above);
+        let bounds = suspect.bounds;
         // Of a sphere around the corners of squares.
         let world = std::f64::consts::SQRT_2 * (reach.world + reach.spacings * spacing);
         let grown = WorldBox { half: bounds.half + DVec3::splat(world), ..bounds };

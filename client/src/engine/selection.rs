@@ -367,13 +367,6 @@ impl Walk<'_> {
         if self.is_outside(&bounds) {
             return Sight::Outside;
         }
-        if let Some(above) = above
-            && self.is_hidden(cloud, node, above, bounds)
-        {
-            return Sight::Hidden;
-        }
-        let Some(tree) = &self.trees[cloud] else { return Sight::Outside };
-        let lattice = &tree.boot().manifest.lattice;
         let bonus =
             if self.previous.contains(&NodeId { cloud, key: node.key }) { HYSTERESIS } else { 1.0 };
         let wanted = node.payloads.iter().enumerate();
@@ -389,9 +382,11 @@ impl Walk<'_> {
         // with few points would never show, and the density of its neighbours' would not be its.
         let cube = cube_radius(lattice.node_side_world(node.key.level()));
         if bonus * self.optics.projected_size(bounds.center, cube) < self.limits.min_size_px {
-            Sight::Small { priority }
-        } else {
-            Sight::Seen { priority }
+            return Sight::Small { priority };
+        }
+        match above {
+            Some(above) if self.is_hidden(cloud, node, above, bounds) => Sight::Hidden,
+            _ => Sight::Seen { priority },
         }
     }
 
@@ -403,11 +398,9 @@ impl Walk<'_> {
         if manifest.refinement == Refinement::Replace {
             return false;
         }
-        let octant = octant_within(node.key, &manifest.bounds, &manifest.lattice);
         let suspect = Suspect {
             id: NodeId { cloud, key: node.key },
             bounds,
-            octant: octant.map_or(bounds, |octant| WorldBox::of(&octant, &manifest.lattice)),
             spacing: f64::from(node.spacing),
             spacing_above: f64::from(above.spacing),
         };
