@@ -3,7 +3,7 @@
 //! The camera moves in simulated time, a new view every step; at instants evenly spread over the path
 //! what is there is compared with the truth from the same place.
 
-use std::sync::atomic::Ordering;
+use std::{sync::atomic::Ordering, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
@@ -99,17 +99,19 @@ impl Streaming<'_> {
                 if self.cancel.load(Ordering::Relaxed) {
                     anyhow::bail!("interrupted");
                 }
-                let now = engine.time().as_secs_f64();
-                let left = instant.seconds - now;
-                if left <= 0.0 {
+                // In whole nanoseconds: of a fraction of one, there is no end.
+                let left = Duration::try_from_secs_f64(instant.seconds)
+                    .unwrap_or_default()
+                    .saturating_sub(engine.time());
+                if left.is_zero() {
                     break;
                 }
-                let camera = path.at(path.start() + now);
+                let camera = path.at(path.start() + engine.time().as_secs_f64());
                 engine.set_view(View { camera, size_px });
-                engine.advance(self.step.min(std::time::Duration::from_secs_f64(left)));
+                engine.advance(self.step.min(left));
             }
             engine.set_view(View { camera: instant.camera, size_px });
-            let plan = engine.advance(std::time::Duration::ZERO);
+            let plan = engine.advance(Duration::ZERO);
             let settings =
                 crate::render::RenderSettings { camera: instant.camera, ..self.settings };
             let picture = self.picture(&plan, &settings)?;

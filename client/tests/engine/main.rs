@@ -7,4 +7,5 @@ mod hosts;
 mod jumps;
 mod picture;
 mod refinement;
+mod simulated;
 mod sources;
