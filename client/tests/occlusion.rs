@@ -63,7 +63,7 @@ impl House {
     }
 
     fn engine(&self, occlusion: bool) -> SimulatedEngine {
-        let file = FileSource::open(&self.folder.path().join("house.lods")).expect("opens");
+        let file = FileSource::open(self.folder.path().join("house.lods")).expect("opens");
         let link = Link::new("100mbit/20ms".parse().expect("a link"), 1);
         let config = EngineConfig {
             point_budget: u64::MAX,
@@ -193,12 +193,16 @@ fn the_bounds_of_a_node_hold_the_points_of_the_nodes_above_in_its_cube() {
 
 #[test]
 fn behind_walls_much_is_left_out() {
-    for size in [SplatSize::Pixels(6.0), SplatSize::Level(1.6), SplatSize::Adaptive(1.6)] {
+    let sizes = [
+        (SplatSize::Pixels(6.0), 0.8),
+        (SplatSize::Level(1.6), 0.5),
+        (SplatSize::Adaptive(1.6), 0.95),
+    ];
+    for (size, most) in sizes {
         let view = settings([11.0, 17.8, 1.8], [11.3, 23.5, 1.4], 1.3, (Splat::Circle, size));
         let (wrong, [all, culled]) = compare(&view);
-        eprintln!("{size:?}: {all} -> {culled}");
         assert_eq!(wrong, 0);
-        assert!(culled < all, "{size:?}: {culled} of {all} points");
+        assert!((culled as f64) < most * all as f64, "{size:?}: {culled} of {all} points");
     }
 }
 
