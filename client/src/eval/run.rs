@@ -126,8 +126,8 @@ pub fn run(
 #[derive(Deserialize)]
 struct BuildReport {
     points_read: u64,
-    points: u64,
-    bytes: u64,
+    points_written: u64,
+    file_bytes: u64,
 }
 
 /// The name, with a number behind it where another is so named.
@@ -187,15 +187,16 @@ fn build(input: &str, method: &str, output: &Path, report: &Path) -> anyhow::Res
         anyhow::bail!("{last}");
     }
     let json = std::fs::read_to_string(report).context("the build's report cannot be read")?;
-    let told: BuildReport = serde_json::from_str(&json)?;
+    let told: BuildReport =
+        serde_json::from_str(&json).context("the build's report cannot be read")?;
     let row = BuildRow {
         method: method.into(),
         seconds,
-        points_per_second: told.points as f64 / seconds,
+        points_per_second: told.points_written as f64 / seconds,
         peak_bytes: Some(ended.rusage.maxrss).filter(|bytes| *bytes > 0),
-        bytes_per_point: told.bytes as f64 / told.points.max(1) as f64,
+        bytes_per_point: told.file_bytes as f64 / told.points_written.max(1) as f64,
         points_in: told.points_read,
-        points_out: told.points,
+        points_out: told.points_written,
     };
     Ok(row)
 }
