@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::{stream::Stop, subject::Subject};
 use crate::{
     engine::{EngineConfig, LeftOut, SimulatedEngine, View},
-    render::{CpuRenderer, RenderSettings, Scene},
+    render::{CpuRenderer, RenderSettings, Scene, SplatSize},
     source::{Link, LinkSpec, Source},
 };
 
@@ -65,6 +65,12 @@ pub struct NotStored {
 
 type Change = (&'static str, fn(&mut EngineConfig, &Subject), fn(&LeftOut) -> Option<[u64; 2]>);
 
+/// Sizes with which occlusion is measured.
+const BEHIND_SIZE: SplatSize = SplatSize::Level(1.6);
+
+/// Between two pictures, as a window draws them.
+const FRAME: Duration = Duration::from_millis(50);
+
 /// Savings that can be switched off.
 const SAVINGS: [Change; 4] = [
     (
@@ -108,6 +114,7 @@ pub fn savings(
     let mut rows = Vec::new();
     for stop in stops {
         let settings = RenderSettings { camera: stop.camera, ..*settings };
+        rows.push(behind(subject, &settings, config, stop, link, seed, cancel)?);
         let (with, left_out) = cost(subject, &settings, config.clone(), link, seed, cancel)?;
         for (saving, switch_off, told) in SAVINGS {
             let mut changed = config.clone();
@@ -127,6 +134,34 @@ pub fn savings(
     Ok(rows)
 }
 
+/// What lies behind what is drawn. With splats as large as their level's points are apart: those that
+/// follow the finest detail leave holes, and behind a hole everything has to be drawn.
+fn behind(
+    subject: &Subject,
+    settings: &RenderSettings,
+    config: &EngineConfig,
+    stop: &Stop,
+    link: LinkSpec,
+    seed: u64,
+    cancel: &AtomicBool,
+) -> anyhow::Result<SavingRow> {
+    let settings = RenderSettings { splat_size: BEHIND_SIZE, ..*settings };
+    let cost = |occlusion| {
+        // Without a bound, or what is left out here makes room there.
+        let config = EngineConfig { occlusion, point_budget: u64::MAX, ..config.clone() };
+        cost(subject, &settings, config, link, seed, cancel)
+    };
+    let ((with, left_out), (without, _)) = (cost(true)?, cost(false)?);
+    Ok(SavingRow {
+        view: stop.name.clone(),
+        saving: format!("behind what is drawn ({BEHIND_SIZE} splats, no budget)"),
+        nodes: Some(left_out.hidden.nodes),
+        points: Some(left_out.hidden.points),
+        with,
+        without,
+    })
+}
+
 fn cost(
     subject: &Subject,
     settings: &RenderSettings,
@@ -136,18 +171,31 @@ fn cost(
     cancel: &AtomicBool,
 ) -> anyhow::Result<(Cost, LeftOut)> {
     let source = Source::linked(subject.file()?, Link::new(link, seed));
+    let reach = settings.splat_reach().filter(|_| config.occlusion);
+    // The plan whose depths were told last.
+    let mut told = None;
     let mut engine = SimulatedEngine::start(vec![source], config)?;
     engine.set_view(View { camera: settings.camera, size_px: settings.size_px });
     let plan = loop {
-        let plan = engine.advance(Duration::from_secs(1));
+        let plan = engine.advance(FRAME);
         if let Some(problem) = engine.stats().problems.first() {
             anyhow::bail!("{problem}");
         }
         if cancel.load(std::sync::atomic::Ordering::Relaxed) {
             anyhow::bail!("interrupted");
         }
-        if plan.settled {
+        if plan.settled && (reach.is_none() || told == Some(plan.sequence)) {
             break plan;
+        }
+        if let Some(reach) = reach
+            && told != Some(plan.sequence)
+        {
+            let scene = Scene { clouds: &subject.clouds, nodes: &plan.nodes };
+            let picture = CpuRenderer.render(&scene, settings)?.picture;
+            if let Some(depth) = picture.depth_pyramid() {
+                engine.set_depth(&plan, depth, reach);
+            }
+            told = Some(plan.sequence);
         }
     };
     let scene = Scene { clouds: &subject.clouds, nodes: &plan.nodes };

@@ -192,3 +192,22 @@ fn nothing_is_settled_before_the_link_can_have_carried_it() {
         }
     }
 }
+
+#[test]
+fn the_top_is_drawn_while_the_first_answer_is_still_on_its_way() {
+    let recipe = Recipe { node_points: 3000, ..Recipe::default() };
+    let bytes = dataset(recipe);
+    let (_folder, path) = write(&bytes);
+    let config = config();
+    let answer = config.speculative_bytes.min(bytes.len() as u64);
+    let mut engine = engine(&path, config, link("1mbit/20ms"), 1);
+    engine.set_view(overview(recipe.corner));
+    let mut first = None;
+    settle(&mut engine, |engine, plan| {
+        if plan.points > 0 {
+            first.get_or_insert_with(|| engine.stats().since_start.totals.bytes);
+        }
+    });
+    let first = first.expect("something is drawn");
+    assert!(first < answer / 2, "drawn after {first} of {answer} bytes");
+}
