@@ -51,7 +51,8 @@ pub struct Node {
     pub child_mask: u8,
     /// Elements in this node alone.
     pub points: u32,
-    /// Holds the elements of this node and of all below it; within 1/256 of the node's side tight.
+    /// Holds the elements of this node and of all below it, and in additive datasets those of the nodes
+    /// above that lie in its cube; within 1/256 of the node's side tight.
     pub bounds: LatticeBox,
     /// How far, in world units, the picture is off where the tree is cut at this node: 0 for leaves.
     pub geometric_error: f32,
