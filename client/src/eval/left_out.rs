@@ -225,7 +225,9 @@ pub fn not_stored(subject: &Subject, settings: &RenderSettings) -> NotStored {
     let constant: Vec<_> = constant.collect();
     let per_point: usize = constant.iter().map(|a| a.value_bytes()).sum();
     let shown = settings.groups(manifest);
-    let unused = manifest.groups.iter().enumerate().filter(|(index, _)| !shown.contains(index));
+    // The first has the positions, which are always fetched.
+    let groups = manifest.groups.iter().enumerate().skip(1);
+    let unused = groups.filter(|(index, _)| !shown.contains(index));
     NotStored {
         constant_attributes: constant.iter().map(|a| a.name.clone()).collect(),
         raw_bytes: manifest.points * per_point as u64,

@@ -29,6 +29,9 @@ use crate::{
 /// Levels of similarity whose times are told.
 pub const LEVELS: [f64; 3] = [0.9, 0.95, 0.98];
 
+/// Of the simulated clock.
+const TIMER_STEP: Duration = Duration::from_millis(1);
+
 /// A view that is looked at until it is complete.
 #[derive(Debug, Clone)]
 pub struct Stop {
@@ -52,7 +55,7 @@ pub struct StreamRun {
     /// Simulated milliseconds until nothing more was to come; `None` where that did not happen in
     /// time.
     pub settled_ms: Option<f64>,
-    /// Bytes received.
+    /// Bytes received, those that came in vain after the picture was complete too.
     pub bytes: u64,
     /// Requests sent.
     pub requests: u64,
@@ -62,7 +65,7 @@ pub struct StreamRun {
     pub ssim: f64,
     /// When each of [`LEVELS`] was reached, for good.
     pub reached: Vec<Option<Reached>>,
-    /// Least milliseconds for the bytes that the complete picture took: their transmission and two
+    /// Least milliseconds for the bytes that had come when the picture was complete: their transmission and two
     /// round trips; one after a jump, when the connection stands; 0 where nothing had to come.
     pub bound_ms: f64,
     /// At the steps at which the picture changed.
@@ -119,15 +122,9 @@ impl Streaming<'_> {
             let truth = truths
                 .get(&stop.name)
                 .ok_or_else(|| anyhow::anyhow!("no truth was drawn of the view {}", stop.name))?;
-            let mut run = self.stop(&mut engine, stop, truth)?;
+            let mut run = self.stop(&mut engine, stop, truth, link, runs.is_empty())?;
             run.link = link.to_string();
             run.policy = policy;
-            let bound = match runs.len() {
-                0 => link.bound(run.bytes),
-                _ if run.bytes == 0 => Duration::ZERO,
-                _ => link.bound(run.bytes).saturating_sub(link.round_trip),
-            };
-            run.bound_ms = bound.as_secs_f64() * 1e3;
             run.from = std::mem::replace(&mut from, stop.name.clone());
             runs.push(run);
         }
@@ -139,6 +136,8 @@ impl Streaming<'_> {
         engine: &mut SimulatedEngine,
         stop: &Stop,
         truth: &Picture,
+        link: LinkSpec,
+        is_cold: bool,
     ) -> anyhow::Result<StreamRun> {
         let settings = RenderSettings { camera: stop.camera, ..self.settings };
         engine.set_view(View { camera: stop.camera, size_px: settings.size_px });
@@ -152,7 +151,12 @@ impl Streaming<'_> {
             if self.cancel.load(Ordering::Relaxed) {
                 anyhow::bail!("interrupted");
             }
-            plan = engine.advance(step);
+            // To the timer's step, so that what comes after the end is told apart.
+            let due = engine.time() + step;
+            plan = engine.advance(Duration::ZERO);
+            while engine.time() < due && !plan.settled {
+                plan = engine.advance(TIMER_STEP.min(due - engine.time()));
+            }
             step = self.step;
             if let Some(problem) = engine.stats().problems.first() {
                 anyhow::bail!("{problem}");
@@ -175,7 +179,22 @@ impl Streaming<'_> {
                 break;
             }
         }
+        let needed_bytes = engine.stats().since_view.totals.bytes;
+        // What was asked for in vain comes too, before the next view.
+        let rest = TIMER_STEP.max(2 * link.round_trip) + Duration::from_secs(1);
+        let mut bytes = None;
+        while bytes.replace(engine.stats().since_view.totals.bytes)
+            != Some(engine.stats().since_view.totals.bytes)
+        {
+            engine.advance(rest);
+        }
         let phase = engine.stats().since_view;
+        let bound = match needed_bytes {
+            _ if is_cold => link.bound(needed_bytes),
+            0 => Duration::ZERO,
+            // The connection stands.
+            _ => link.bound(needed_bytes).saturating_sub(link.round_trip),
+        };
         Ok(StreamRun {
             view: stop.name.clone(),
             from: String::new(),
@@ -187,7 +206,7 @@ impl Streaming<'_> {
             points: plan.points,
             ssim: samples.last().map_or(f64::NAN, |sample| sample.ssim),
             reached: LEVELS.map(|level| curve::reached(&samples, level)).into(),
-            bound_ms: 0.0,
+            bound_ms: bound.as_secs_f64() * 1e3,
             samples,
         })
     }
