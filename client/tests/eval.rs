@@ -114,7 +114,8 @@ fn compares(folder: &Path, report: &Report) {
     assert_eq!((code, said.lines().count()), (Some(0), 1), "{said}");
     assert!(said.starts_with("0 worse or gone, 0 different"), "{said}");
 
-    let worse: [(&str, &dyn Fn(&mut Report)); 5] = [
+    type Worse<'a> = (&'a str, &'a dyn Fn(&mut Report));
+    let worse: [Worse; 5] = [
         ("near point 1px 5000 ssim", &|r| {
             r.subjects[0].frames[0].error.ssim =
                 r.subjects[0].frames[0].error.ssim.map(|s| s - 0.01);
