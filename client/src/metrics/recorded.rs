@@ -107,26 +107,3 @@ fn another_sigma_or_window_would_miss() {
 fn is_flat(a: &Picture, b: &Picture) -> bool {
     [a, b].iter().all(|p| p.rgba8.chunks_exact(4).all(|pixel| pixel == &p.rgba8[..4]))
 }
-
-/// `cargo test --release -p lodestream-client --lib -- --ignored --nocapture milliseconds_of`
-#[test]
-#[ignore = "a measurement"]
-fn milliseconds_of_a_pair_of_1280_by_720() {
-    use super::testing::{grey, texture};
-    let picture = |shift| Picture {
-        depth: vec![1.0; 1280 * 720],
-        ..grey(1280, 720, move |x, y| texture(x + shift, y))
-    };
-    let (a, b) = (picture(0), picture(1));
-    let best = |what: &dyn Fn()| {
-        let run = |_| {
-            let start = std::time::Instant::now();
-            what();
-            start.elapsed().as_secs_f64() * 1e3
-        };
-        (0..10).map(run).fold(f64::INFINITY, f64::min)
-    };
-    println!("ssim {:.1} ms", best(&|| assert!(ssim(&a, &b).is_ok())));
-    println!("ssim_color {:.1} ms", best(&|| assert!(ssim_color(&a, &b).is_ok())));
-    println!("PictureError {:.1} ms", best(&|| assert!(PictureError::between(&a, &b).is_ok())));
-}
