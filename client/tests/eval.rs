@@ -175,6 +175,27 @@ fn a_bare_cloud_does_without_what_it_does_not_have() {
 }
 
 #[test]
+fn a_cloud_of_which_everything_has_come_is_its_truth_whatever_it_is_coloured_by() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let mut text = String::from("x y z intensity\n");
+    for index in 0..4000_u32 {
+        let (x, y) = (f64::from(index % 80) * 0.1, f64::from(index / 80) * 0.1);
+        text += &format!("{x:.1} {y:.1} {:.1} {}\n", (x * 0.7).sin(), (index * 37) % 251);
+    }
+    let input = folder.path().join("grey.xyz");
+    std::fs::write(&input, text).expect("written");
+    let output = folder.path().join("out");
+    let paths = [&input, &output].map(|path| path.display().to_string());
+    let options = ["--quick", "--sizes", "medium", "--budgets", "9000", "--splats", "circle:2px"];
+    evaluated(&[&[&*paths[0], "-o", &*paths[1]], &options[..]].concat());
+    let report = report(&output);
+    let [subject] = report.subjects.as_slice() else { panic!("one dataset") };
+    let whole = subject.streams.iter().filter(|run| run.points == subject.points);
+    let similar: Vec<_> = whole.map(|run| run.ssim).collect();
+    assert!(!similar.is_empty() && similar.iter().all(|ssim| *ssim == 1.0), "{similar:?}");
+}
+
+#[test]
 fn wrong_inputs_are_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let file = |name: &str, text: &str| {

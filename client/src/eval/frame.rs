@@ -96,7 +96,9 @@ pub fn frames(
         let Some(truth) = truths.get(&stop.name) else { continue };
         let first = rows.len();
         for &budget in budgets {
-            let config = EngineConfig { point_budget: budget, ..EngineConfig::default() };
+            let attributes = subject.shown(settings);
+            let config =
+                EngineConfig { point_budget: budget, attributes, ..EngineConfig::default() };
             let view = View { camera: stop.camera, size_px: settings.size_px };
             let (plan, _) = settled(subject, config, view, cancel)?;
             let scene = Scene { clouds: &subject.clouds, nodes: &plan.nodes };

@@ -280,7 +280,11 @@ fn evaluate(
     let streaming = Streaming {
         subject,
         settings: base,
-        config: EngineConfig { point_budget: config.stream_budget, ..EngineConfig::default() },
+        config: EngineConfig {
+            point_budget: config.stream_budget,
+            attributes: subject.shown(&base),
+            ..EngineConfig::default()
+        },
         step: Duration::from_millis(50),
         patience: Duration::from_secs(120),
         seed: config.seed,

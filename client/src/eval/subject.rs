@@ -85,6 +85,14 @@ impl Subject {
         &self.clouds[0]
     }
 
+    /// The names of the attributes that pictures of such settings show.
+    #[must_use]
+    pub fn shown(&self, settings: &RenderSettings) -> Vec<String> {
+        let manifest = self.manifest();
+        let shown = settings.attributes(manifest).into_iter();
+        shown.map(|index| manifest.attributes[index].name.clone()).collect()
+    }
+
     /// The file, to be put behind a link.
     ///
     /// # Errors
