@@ -4,6 +4,8 @@ pub mod camera;
 pub mod commands;
 pub mod engine;
 pub mod eval;
+mod full_resolution;
+mod interrupt;
 pub mod metrics;
 pub mod path;
 pub mod render;

@@ -11,11 +11,14 @@ use std::{
 use lodestream_protocol::Storage;
 use serde::{Deserialize, Serialize};
 
-use super::{stream::Stop, subject::Subject};
+use super::{
+    stream::Stop,
+    subject::{Subject, advance},
+};
 use crate::{
-    engine::{EngineConfig, LeftOut, SimulatedEngine, View},
+    engine::{EngineConfig, LeftOut, View},
     render::{CpuRenderer, RenderSettings, Scene, SplatSize},
-    source::{Link, LinkSpec, Source},
+    source::LinkSpec,
 };
 
 /// What a view cost.
@@ -170,20 +173,13 @@ fn cost(
     seed: u64,
     cancel: &AtomicBool,
 ) -> anyhow::Result<(Cost, LeftOut)> {
-    let source = Source::linked(subject.file()?, Link::new(link, seed));
     let reach = settings.splat_reach().filter(|_| config.occlusion);
     // The plan whose depths were told last.
     let mut told = None;
-    let mut engine = SimulatedEngine::start(vec![source], config)?;
+    let mut engine = subject.engine(config, link, seed)?;
     engine.set_view(View { camera: settings.camera, size_px: settings.size_px });
     let plan = loop {
-        let plan = engine.advance(FRAME);
-        if let Some(problem) = engine.stats().problems.first() {
-            anyhow::bail!("{problem}");
-        }
-        if cancel.load(std::sync::atomic::Ordering::Relaxed) {
-            anyhow::bail!("interrupted");
-        }
+        let plan = advance(&mut engine, FRAME, cancel)?;
         if plan.settled && (reach.is_none() || told == Some(plan.sequence)) {
             break plan;
         }

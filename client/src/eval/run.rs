@@ -282,7 +282,7 @@ fn evaluate(
         settings: base,
         config: EngineConfig {
             point_budget: config.stream_budget,
-            attributes: subject.shown(&base),
+            attributes: base.attribute_names(subject.manifest()),
             ..EngineConfig::default()
         },
         step: Duration::from_millis(50),

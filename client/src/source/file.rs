@@ -10,7 +10,7 @@ use std::{
 
 use bytes::Bytes;
 
-use super::{Announced, SourceError};
+use super::SourceError;
 
 /// A local dataset file. Clones share the open file.
 #[derive(Debug, Clone)]
@@ -70,17 +70,6 @@ impl FileSource {
         sink: &mut (dyn FnMut(Bytes) + Send),
     ) -> Result<(), SourceError> {
         sink(self.read(offset, len).await?);
-        Ok(())
-    }
-
-    pub(super) async fn stream_prefix(
-        &self,
-        len: u64,
-        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
-    ) -> Result<(), SourceError> {
-        let total = self.inner.len;
-        let bytes = self.read(0, len.min(total)).await?;
-        sink(bytes, Announced { len: len.min(total), total: Some(total) });
         Ok(())
     }
 

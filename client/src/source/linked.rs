@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use super::{Announced, FileSource, Link, SourceError};
+use super::{FileSource, Link, SourceError};
 
 /// A local dataset file whose bytes come as slowly as a [`Link`] lets them.
 ///
@@ -42,15 +42,5 @@ impl LinkedSource {
             })
             .await;
         Ok(())
-    }
-
-    pub(super) async fn stream_prefix(
-        &self,
-        len: u64,
-        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
-    ) -> Result<(), SourceError> {
-        let total = self.file.len();
-        let announced = Announced { len: len.min(total), total: Some(total) };
-        self.stream_range(0, announced.len, &mut |piece| sink(piece, announced)).await
     }
 }

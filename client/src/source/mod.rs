@@ -144,10 +144,18 @@ impl Source {
         len: u64,
         sink: &mut (dyn FnMut(Bytes, Announced) + Send),
     ) -> Result<(), SourceError> {
+        // Of a file the length is known.
+        let announced = |total: u64| Announced { len: len.min(total), total: Some(total) };
         match self {
             Self::Http(source) => source.stream_prefix(len, sink).await,
-            Self::File(source) => source.stream_prefix(len, sink).await,
-            Self::Linked(source) => source.stream_prefix(len, sink).await,
+            Self::File(source) => {
+                let announced = announced(source.len());
+                source.stream_range(0, announced.len, &mut |piece| sink(piece, announced)).await
+            }
+            Self::Linked(source) => {
+                let announced = announced(source.len());
+                source.stream_range(0, announced.len, &mut |piece| sink(piece, announced)).await
+            }
         }
     }
 

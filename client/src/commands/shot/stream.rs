@@ -67,10 +67,7 @@ impl Stream {
 
     /// Asks for the attributes that pictures of such settings need, whatever their cameras.
     pub fn set_attributes(&self, settings: &RenderSettings) {
-        let needed = self.clouds.iter().flat_map(|cloud| {
-            let name = |a: usize| cloud.attributes[a].name.clone();
-            settings.attributes(cloud).into_iter().map(name).collect::<Vec<_>>()
-        });
+        let needed = self.clouds.iter().flat_map(|cloud| settings.attribute_names(cloud));
         self.engine.set_attributes(needed.collect());
     }
 

@@ -459,14 +459,18 @@ impl Loader {
         pieces.collect()
     }
 
+    /// Bytes that a cloud's requests in flight have still to bring.
+    fn left_bytes(&self, cloud: usize) -> u64 {
+        let flights = self.flights.values().filter(|flight| flight.cloud == cloud);
+        flights.map(Flight::left_bytes).sum()
+    }
+
     /// Bytes that may be asked for of a cloud: none while those in flight keep its link busy.
     fn allowance(&self, cloud: usize) -> u64 {
         if !self.config.paces {
             return u64::MAX;
         }
-        let flights = self.flights.values().filter(|flight| flight.cloud == cloud);
-        let left: u64 = flights.map(Flight::left_bytes).sum();
-        let left = left + self.clouds[cloud].prefix_left();
+        let left = self.left_bytes(cloud) + self.clouds[cloud].prefix_left();
         let limit = self.clouds[cloud].pace.limit_bytes();
         if left > limit { 0 } else { 2 * limit - left }
     }
@@ -474,9 +478,7 @@ impl Loader {
     /// Has it told when more may be asked for.
     fn wait_for_turns(&self) {
         for (index, cloud) in self.clouds.iter().enumerate() {
-            let flights = self.flights.values().filter(|flight| flight.cloud == index);
-            let left: u64 = flights.map(Flight::left_bytes).sum();
-            let turn = left.saturating_sub(cloud.pace.limit_bytes());
+            let turn = self.left_bytes(index).saturating_sub(cloud.pace.limit_bytes());
             let delivered = cloud.delivered.bytes.load(Ordering::Relaxed);
             cloud.delivered.waited_for.store(delivered + turn, Ordering::Relaxed);
         }
