@@ -19,21 +19,21 @@ mod lattice;
 mod manifest;
 mod morton;
 mod normal_cone;
+mod position;
 mod wire;
 
 pub use attribute::{Attribute, Domain, ScalarType, Storage};
 pub use boot::{
     BOOT_SPECULATIVE_BYTES, Boot, HEADER_BYTES, Header, MAGIC, VERSION_MAJOR, VERSION_MINOR,
 };
-pub use column::{
-    Column, DecodedGroup, Encoding, decode_group, decode_unchecked, encode_column, encode_positions,
-};
+pub use column::{Column, DecodedGroup, Encoding, decode_group, decode_unchecked, encode_column};
 pub use dataset::{Dataset, NodePoints, ReadAt};
 pub use error::{Error, Result};
 pub use hierarchy::{HierarchyPage, MAX_NODE_POINTS, Node, PageRef, PayloadRef};
 pub use key::NodeKey;
 pub use lattice::{Lattice, LatticeBox, MAX_SIDE_BITS};
-pub use manifest::{GroupInfo, Manifest, Method, Primitive, Refinement, SourceInfo};
+pub use manifest::{Fine, GroupInfo, Manifest, Method, Primitive, Refinement, SourceInfo};
 pub use morton::{MortonCode, morton_decode, morton_encode};
 pub use normal_cone::NormalCone;
+pub use position::{FinePositions, encode_cells, encode_fine_positions, encode_positions};
 pub use wire::MAX_PAGE_BYTES;

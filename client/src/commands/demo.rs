@@ -105,6 +105,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
             drop_attributes: Vec::new(),
             columns: None,
             scale: None,
+            cells_per_spacing: lodestream_preprocess::CELLS_PER_SPACING,
             cancel: cancel_on_interrupt()?,
         },
         &progress,

@@ -44,6 +44,7 @@ impl Policy {
     pub fn apply(self, config: EngineConfig) -> EngineConfig {
         // No payloads with the first bytes.
         let apart = EngineConfig {
+            cell_px: 0.0,
             coalesce: Coalesce::NONE,
             paces: false,
             cancels: false,

@@ -14,7 +14,7 @@ use std::{
     sync::Arc,
 };
 
-use lodestream_protocol::{Lattice, LatticeBox, Node, NodeKey, Refinement};
+use lodestream_protocol::{Lattice, LatticeBox, Manifest, Node, NodeKey, Refinement};
 
 use super::{
     occlusion::{Occluders, Suspect},
@@ -35,6 +35,7 @@ const HYSTERESIS: f64 = 1.1;
 pub(super) struct Limits {
     pub point_budget: u64,
     pub min_size_px: f64,
+    pub cell_px: f64,
     pub culls_outside: bool,
     pub priority: Priority,
 }
@@ -53,6 +54,8 @@ pub(super) struct Pick {
     pub priority: f64,
     /// Points that this node or what stands in for it may come to.
     pub reserved: u64,
+    /// Whether its positions are to be exact.
+    pub is_exact: bool,
 }
 
 /// What a view wants.
@@ -243,9 +246,12 @@ impl Walk<'_> {
         parent: Option<usize>,
         priority: f64,
     ) -> usize {
-        let refinement = match &self.trees[cloud] {
-            Some(tree) => tree.boot().manifest.refinement,
-            None => Refinement::Additive,
+        let (refinement, is_exact) = match &self.trees[cloud] {
+            Some(tree) => {
+                let manifest = &tree.boot().manifest;
+                (manifest.refinement, self.shows_cells(manifest, node))
+            }
+            None => (Refinement::Additive, false),
         };
         self.out.picks.push(Pick {
             id: NodeId { cloud, key: node.key },
@@ -255,8 +261,21 @@ impl Walk<'_> {
             family: None,
             priority,
             reserved: u64::from(node.points),
+            is_exact,
         });
         self.out.picks.len() - 1
+    }
+
+    /// Whether the cells that a node's points lie in are large enough to be seen.
+    fn shows_cells(&self, manifest: &Manifest, node: &Node) -> bool {
+        let cell_bits = manifest.cell_bits(node.key.level(), node.spacing);
+        if cell_bits == 0 {
+            return false;
+        }
+        let cell_world = f64::from(cell_bits).exp2() * manifest.lattice.scale;
+        let bounds = WorldBox::of(&node.bounds, &manifest.lattice);
+        // Where the numbers are no numbers, too.
+        !(cell_world * self.optics.largest_scale(&bounds) <= self.limits.cell_px)
     }
 
     /// Reserves points for the children of a replaced node and returns by how much the whole grows,
@@ -575,6 +594,7 @@ mod tests {
             largest_rounding: 0.0,
             attributes: vec![],
             groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
+            fine: None,
             crs: None,
             sources: vec![],
         }
@@ -588,6 +608,7 @@ mod tests {
 
     const LIMITS: Limits = Limits {
         point_budget: 8000,
+        cell_px: 0.25,
         min_size_px: 20.0,
         culls_outside: true,
         priority: Priority::ErrorPerByte,

@@ -70,28 +70,20 @@ impl Store {
         let (resident, total) = if let Some(resident) = self.pinned.get_mut(&id) {
             (resident, &mut self.pinned_bytes)
         } else {
-            let empty = || Resident {
-                points: Arc::new(NodePoints {
-                    key: id.key,
-                    positions: Vec::new(),
-                    columns: Vec::new(),
-                }),
-                groups: 0,
-                bytes: 0,
-            };
+            let empty =
+                || Resident { points: Arc::new(NodePoints::new(id.key)), groups: 0, bytes: 0 };
             (self.cached.get_or_insert_mut(id, empty), &mut self.cached_bytes)
         };
         if resident.groups & group_bit(group) != 0 {
             return;
         }
-        resident.groups |= group_bit(group);
         // Copies where a plan holds the points: a further group came after the first picture.
-        let points = Arc::make_mut(&mut resident.points);
-        if group == 0 {
-            points.positions = decoded.positions;
+        if Arc::make_mut(&mut resident.points).add(decoded).is_err() {
+            // Fine positions of a node that was dropped meanwhile: they will be asked for again.
+            return;
         }
-        points.columns.extend(decoded.columns);
-        points.columns.sort_by_key(|column| column.attribute);
+        resident.groups |= group_bit(group);
+        let points = resident.points.as_ref();
         self.fresh.insert(id);
         let bytes = size_bytes(points);
         *total += bytes - resident.bytes;
@@ -178,7 +170,7 @@ mod tests {
 
     /// 12 bytes a point.
     fn base(points: usize) -> DecodedGroup {
-        DecodedGroup { positions: vec![[1, 2, 3]; points], columns: vec![] }
+        DecodedGroup { positions: vec![[1, 2, 3]; points], ..DecodedGroup::default() }
     }
 
     fn store(cache_limit: u64, nodes: u8) -> Store {
@@ -212,7 +204,7 @@ mod tests {
     #[test]
     fn groups_join_in_any_order_and_leave_shared_points_alone() {
         let columns = vec![Column { attribute: 1, bytes: vec![0; 20] }];
-        let further = DecodedGroup { positions: vec![], columns };
+        let further = DecodedGroup { columns, ..DecodedGroup::default() };
         let mut store = Store::new(1000);
         store.add(id(0), 1, further.clone());
         assert!(store.points(id(0)).is_none(), "no positions yet");

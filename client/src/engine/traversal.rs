@@ -14,7 +14,7 @@ use super::{
     drawing::{self, Presence},
     event::Event,
     inbox::{Demand, TraversalMail},
-    occlusion::{Drawn, Occluders},
+    occlusion::{Drawn, DrawnNode, Occluders},
     piece::{NodeId, Part, Piece, PieceId},
     plan::{DrawNode, FramePlan},
     selection::{self, Limits, Pick, Selection},
@@ -46,8 +46,8 @@ pub(super) struct Traversal {
     drawn: Option<Drawn>,
     /// Nodes of the view that are not to be taken for hidden.
     in_sight: HashSet<NodeId>,
-    /// What the newest plan draws.
-    shown: Vec<NodeId>,
+    /// What the newest plan draws, and how exactly.
+    shown: Vec<DrawnNode>,
     /// Whether everything that the newest plan wants is there.
     is_loaded: bool,
     sequence: u64,
@@ -55,8 +55,10 @@ pub(super) struct Traversal {
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Cloud {
-    /// Groups that a complete node has.
+    /// Groups that a complete node has, but for fine positions.
     groups: GroupMask,
+    /// The group of fine positions, where the cloud has any.
+    fine: GroupMask,
     failed: bool,
 }
 
@@ -67,6 +69,7 @@ impl Traversal {
             limits: Limits {
                 point_budget: config.point_budget,
                 min_size_px: config.min_size_px,
+                cell_px: config.cell_px,
                 culls_outside: config.culls_outside,
                 priority: config.priority,
             },
@@ -189,6 +192,7 @@ impl Traversal {
             .chain(wanted)
             .filter_map(|name| manifest.attribute(name)?.group())
             .fold(group_bit(0), |mask, group| mask | group_bit(group));
+        self.clouds[cloud].fine = manifest.fine.map_or(0, |fine| group_bit(fine.group));
     }
 
     fn select(&mut self) {
@@ -200,6 +204,7 @@ impl Traversal {
         let occluders = drawn.map(|drawn| Occluders {
             drawn,
             in_sight: &mut self.in_sight,
+            cell_px: self.limits.cell_px,
             is_complete: self.is_loaded && drawn.is_of(self.shown.iter().copied()),
         });
         let (limits, previous) = (self.limits, &self.previous);
@@ -235,19 +240,24 @@ impl Traversal {
         }
         let mut pieces = self.missing_pages();
         plan.pages_loading = pieces.len() as u64;
+        // Every node roughly before any of them exactly.
+        let mut fine = Vec::new();
         for &i in &drawing.needed {
             let pick = &self.selection.picks[i];
             let before = pieces.len();
-            self.missing_groups(pick, &mut pieces);
+            self.missing_groups(pick, self.clouds[pick.id.cloud].groups, &mut pieces);
             if pieces.len() > before {
                 plan.left_out.loading.add(pick.node.points);
             } else if self.presence(pick) == Presence::Lost {
                 plan.left_out.failed.add(pick.node.points);
+            } else if pick.is_exact {
+                self.missing_groups(pick, self.clouds[pick.id.cloud].fine, &mut fine);
             }
         }
+        pieces.append(&mut fine);
         let all_open =
             self.trees.iter().zip(&self.clouds).all(|(tree, cloud)| tree.is_some() || cloud.failed);
-        self.shown = plan.nodes.iter().map(|n| NodeId { cloud: n.cloud, key: n.key }).collect();
+        self.shown = plan.nodes.iter().map(DrawnNode::of).collect();
         self.is_loaded = self.view.is_some() && all_open && pieces.is_empty();
         plan.settled = self.is_loaded && self.hides_rightly();
         // Per cloud, so that a host which does not answer keeps nothing from the others.
@@ -300,11 +310,10 @@ impl Traversal {
             .collect()
     }
 
-    /// Adds the groups that a node still lacks.
-    fn missing_groups(&self, pick: &Pick, pieces: &mut Vec<Piece>) {
-        let cloud = self.clouds[pick.id.cloud];
-        let missing = cloud.groups & !self.store.groups(pick.id);
-        if missing == 0 || cloud.failed {
+    /// Adds those of `groups` that a node still lacks.
+    fn missing_groups(&self, pick: &Pick, groups: GroupMask, pieces: &mut Vec<Piece>) {
+        let missing = groups & !self.store.groups(pick.id);
+        if missing == 0 || self.clouds[pick.id.cloud].failed {
             return;
         }
         let groups = (0..pick.node.payloads.len()).filter(|&g| missing & group_bit(g) != 0);

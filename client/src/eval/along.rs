@@ -90,8 +90,7 @@ impl Streaming<'_> {
         link: LinkSpec,
         policy: Policy,
     ) -> anyhow::Result<PathRun> {
-        let config = policy.apply(self.config.clone());
-        let mut engine = self.subject.engine(config, link, self.seed)?;
+        let mut engine = self.subject.engine(self.config.clone(), policy, link, self.seed)?;
         let size_px = self.settings.size_px;
         let mut samples = Vec::new();
         let mut pictures: Vec<Picture> = Vec::new();

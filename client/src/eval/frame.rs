@@ -14,7 +14,7 @@ use super::{
     subject::{Subject, advance},
 };
 use crate::{
-    engine::{EngineConfig, FramePlan, View},
+    engine::{EngineConfig, FramePlan, Policy, View},
     metrics::PictureError,
     render::{CpuRenderer, Picture, RenderSettings, Scene, Splat, SplatSize},
     source::LinkSpec,
@@ -56,7 +56,7 @@ fn settled(
     view: View,
     cancel: &AtomicBool,
 ) -> anyhow::Result<Arc<FramePlan>> {
-    let mut engine = subject.engine(config, AT_ONCE, 0)?;
+    let mut engine = subject.engine(config, Policy::Ours, AT_ONCE, 0)?;
     engine.set_view(view);
     loop {
         let plan = advance(&mut engine, Duration::from_millis(100), cancel)?;

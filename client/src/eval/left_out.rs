@@ -16,7 +16,7 @@ use super::{
     subject::{Subject, advance},
 };
 use crate::{
-    engine::{EngineConfig, LeftOut, View},
+    engine::{EngineConfig, LeftOut, Policy, View},
     render::{CpuRenderer, RenderSettings, Scene, SplatSize},
     source::LinkSpec,
 };
@@ -75,7 +75,7 @@ const BEHIND_SIZE: SplatSize = SplatSize::Level(1.6);
 const FRAME: Duration = Duration::from_millis(50);
 
 /// Savings that can be switched off.
-const SAVINGS: [Change; 4] = [
+const SAVINGS: [Change; 5] = [
     (
         "outside the picture",
         |config, _| config.culls_outside = false,
@@ -86,6 +86,7 @@ const SAVINGS: [Change; 4] = [
         |config, _| config.min_size_px = 0.0,
         |left_out| Some([left_out.small.nodes, left_out.small.points]),
     ),
+    ("positions finer than the pixels", |config, _| config.cell_px = 0.0, |_| None),
     (
         "over the point budget",
         |config, _| config.point_budget = u64::MAX,
@@ -176,7 +177,7 @@ fn cost(
     let reach = settings.splat_reach().filter(|_| config.occlusion);
     // The plan whose depths were told last.
     let mut told = None;
-    let mut engine = subject.engine(config, link, seed)?;
+    let mut engine = subject.engine(config, Policy::Ours, link, seed)?;
     engine.set_view(View { camera: settings.camera, size_px: settings.size_px });
     let plan = loop {
         let plan = advance(&mut engine, FRAME, cancel)?;

@@ -101,6 +101,11 @@ pub fn run(
                 subject.name = format!("{} {}", subject.name, build.method);
             }
             subject.name = unique(&subject.name, opened.iter().map(|(other, _)| &*other.name));
+            if config.policies.iter().any(|policy| *policy != Policy::Ours) {
+                let folder = tempfile::tempdir_in(scratch.path());
+                subject
+                    .prepare_rivals(&folder.context("cannot make a temporary folder")?.keep())?;
+            }
             opened.push((subject, build));
         }
     }

@@ -111,8 +111,7 @@ impl Streaming<'_> {
         link: LinkSpec,
         policy: Policy,
     ) -> anyhow::Result<Vec<StreamRun>> {
-        let config = policy.apply(self.config.clone());
-        let mut engine = self.subject.engine(config, link, self.seed)?;
+        let mut engine = self.subject.engine(self.config.clone(), policy, link, self.seed)?;
         let mut from = "cold".to_owned();
         let mut runs = Vec::new();
         for stop in stops {

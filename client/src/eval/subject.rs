@@ -8,11 +8,11 @@ use std::{
 
 use anyhow::Context;
 use glam::DVec3;
-use lodestream_preprocess::FileSource as PositionedFile;
+use lodestream_preprocess::{FileSource as PositionedFile, with_whole_positions};
 use lodestream_protocol::{Dataset, Manifest, Node};
 
 use crate::{
-    engine::{EngineConfig, FramePlan, SimulatedEngine},
+    engine::{EngineConfig, FramePlan, Policy, SimulatedEngine},
     full_resolution,
     interrupt::go_on,
     render::{Picture, RenderSettings, TruthRenderer, VisibleTree},
@@ -31,6 +31,8 @@ pub struct Subject {
     pub bounds: [DVec3; 2],
     /// Where its points have their middle.
     pub middle: DVec3,
+    /// The same points with positions in one part, where the file has them in two.
+    whole: Option<PathBuf>,
     dataset: Dataset<PositionedFile>,
     /// The nodes that hold every point once.
     nodes: Vec<Node>,
@@ -63,6 +65,7 @@ impl Subject {
         let name = path.file_stem().map(|name| name.to_string_lossy().into_owned());
         Ok(Self {
             name: name.unwrap_or_default(),
+            whole: None,
             path: path.to_owned(),
             clouds: vec![manifest],
             bounds: [bounds.0.into(), bounds.1.into()],
@@ -78,17 +81,37 @@ impl Subject {
         &self.clouds[0]
     }
 
-    /// An engine that fetches the dataset by such a link, in simulated time.
+    /// Prepares for the rivals' policies: they know no positions in two parts, and fetch of every node a
+    /// range that holds all of it. So they fetch from a twin, which is written to `folder`.
+    ///
+    /// # Errors
+    /// Where the twin cannot be written.
+    pub fn prepare_rivals(&mut self, folder: &Path) -> anyhow::Result<()> {
+        if self.manifest().fine.is_some() {
+            let path = folder.join(format!("{}.lods", self.name));
+            with_whole_positions(&self.dataset, &path)?;
+            self.whole = Some(path);
+        }
+        Ok(())
+    }
+
+    /// An engine that fetches the dataset by such a link and policy, in simulated time.
     ///
     /// # Errors
     /// Where the file cannot be opened any more.
     pub fn engine(
         &self,
         config: EngineConfig,
+        policy: Policy,
         link: LinkSpec,
         seed: u64,
     ) -> anyhow::Result<SimulatedEngine> {
-        let source = Source::linked(FileSource::open(&self.path)?, Link::new(link, seed));
+        let path = match (policy, &self.whole) {
+            (Policy::Potree | Policy::Fraiss, Some(whole)) => whole,
+            _ => &self.path,
+        };
+        let config = policy.apply(config);
+        let source = Source::linked(FileSource::open(path)?, Link::new(link, seed));
         Ok(SimulatedEngine::start(vec![source], config)?)
     }
 

@@ -118,6 +118,7 @@ fn manifest(recipe: Recipe) -> Manifest {
             GroupInfo { name: "base".into(), columns: vec![0, 0] },
             GroupInfo { name: "intensity".into(), columns: vec![0] },
         ],
+        fine: None,
         crs: None,
         sources: vec![],
     }

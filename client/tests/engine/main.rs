@@ -6,6 +6,7 @@ mod common;
 mod hosts;
 mod jumps;
 mod picture;
+mod precision;
 mod refinement;
 mod simulated;
 mod sources;

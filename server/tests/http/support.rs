@@ -35,6 +35,7 @@ pub fn dataset(seed: u8, tail: usize) -> Vec<u8> {
         largest_rounding: 0.0,
         attributes: vec![color],
         groups: vec![GroupInfo { name: "base".into(), columns: vec![0, 0] }],
+        fine: None,
         crs: None,
         sources: vec![],
     };
