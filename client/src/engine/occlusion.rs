@@ -77,6 +77,8 @@ impl DrawnNode {
 #[derive(Debug, Clone)]
 pub(super) struct Drawn {
     pub view: View,
+    /// Of the plan.
+    pub sequence: u64,
     /// In order.
     nodes: Vec<DrawnNode>,
     depth: Arc<DepthPyramid>,
@@ -88,7 +90,7 @@ impl Drawn {
     pub fn new(plan: &FramePlan, depth: Arc<DepthPyramid>, reach: SplatReach) -> Option<Self> {
         let view = plan.view.filter(|view| view.size_px == depth.size_px())?;
         let nodes = in_order(plan.nodes.iter().map(DrawnNode::of));
-        Some(Self { view, nodes, depth, reach })
+        Some(Self { view, sequence: plan.sequence, nodes, depth, reach })
     }
 
     /// Whether it is a picture of these nodes.

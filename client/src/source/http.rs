@@ -5,35 +5,18 @@
 //! whole files again and again; its 200 is recognised from the head and the connection is closed
 //! without the body.
 
-use std::{
-    sync::{Arc, OnceLock},
-    time::Duration,
-};
+use std::sync::{Arc, OnceLock};
 
 use bytes::Bytes;
 use reqwest::{
-    Client, Response, StatusCode, Url,
+    Response, StatusCode, Url,
     header::{self, HeaderMap},
 };
 
-use super::{Announced, SourceError};
-
-/// How long a host may be silent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Timeouts {
-    /// Until a connection stands.
-    pub connect: Duration,
-    /// Until the head of an answer or the next part of its body arrives. There is no limit for a
-    /// whole answer: a slow link is no failure.
-    pub silence: Duration,
-}
-
-impl Default for Timeouts {
-    /// 10 s to connect, 15 s of silence.
-    fn default() -> Self {
-        Self { connect: Duration::from_secs(10), silence: Duration::from_secs(15) }
-    }
-}
+use super::{
+    Announced, SourceError,
+    connector::{Connections, Connector, Timeouts},
+};
 
 /// A dataset file at a URL. Clones share connections.
 #[derive(Debug, Clone)]
@@ -43,7 +26,7 @@ pub struct HttpSource {
 
 #[derive(Debug)]
 struct Inner {
-    client: Client,
+    connector: Arc<Connector>,
     url: Url,
     /// The URL without what may be secret.
     place: String,
@@ -55,6 +38,8 @@ struct Inner {
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Identity {
     etag: Option<String>,
+    /// `Last-Modified`, for hosts that have no entity tags.
+    modified: Option<String>,
     total: Option<u64>,
 }
 
@@ -77,33 +62,31 @@ struct ContentRange {
 
 impl HttpSource {
     /// A source at `url` with the default [`Timeouts`]. Nothing is asked yet.
-    ///
-    /// # Errors
-    /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
-    pub fn new(url: Url) -> Result<Self, SourceError> {
+    #[must_use]
+    pub fn new(url: Url) -> Self {
         Self::with_timeouts(url, Timeouts::default())
     }
 
     /// A source at `url`. Nothing is asked yet.
-    ///
-    /// # Errors
-    /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
-    pub fn with_timeouts(url: Url, timeouts: Timeouts) -> Result<Self, SourceError> {
-        // An error means that the process has chosen its provider already: just as good.
-        let _ = rustls::crypto::ring::default_provider().install_default();
+    #[must_use]
+    pub fn with_timeouts(url: Url, timeouts: Timeouts) -> Self {
+        let connector = Arc::new(Connector::new(timeouts, &url));
+        Self::through(connector, url)
+    }
+
+    fn through(connector: Arc<Connector>, url: Url) -> Self {
         let place = without_secrets(&url);
-        let mut builder = Client::builder()
-            .user_agent(concat!("lodestream/", env!("CARGO_PKG_VERSION")))
-            .tcp_nodelay(true)
-            .connect_timeout(timeouts.connect)
-            .read_timeout(timeouts.silence);
-        if is_loopback(&url) {
-            builder = builder.no_proxy();
-        }
-        let client = builder
-            .build()
-            .map_err(|e| SourceError::permanent(&place, format!("no HTTP client: {e}")))?;
-        Ok(Self { inner: Arc::new(Inner { client, url, place, identity: OnceLock::new() }) })
+        Self { inner: Arc::new(Inner { connector, url, place, identity: OnceLock::new() }) }
+    }
+
+    /// A source of whatever lies at the URL now. Shares connections.
+    pub(super) fn renew(&self) -> Self {
+        Self::through(Arc::clone(&self.inner.connector), self.inner.url.clone())
+    }
+
+    /// The source, sharing connections with others.
+    pub(super) fn sharing(&self, connections: &Connections) -> Self {
+        Self::through(connections.shared(&self.inner.connector), self.inner.url.clone())
     }
 
     /// The URL, with whatever secrets it holds.
@@ -149,9 +132,8 @@ impl HttpSource {
         let Some(last) = ask.len.checked_sub(1).and_then(|n| ask.offset.checked_add(n)) else {
             return Err(self.permanent(format!("{} bytes at {} are no range", ask.len, ask.offset)));
         };
-        let response = self
-            .inner
-            .client
+        let client = self.inner.connector.client().map_err(|why| self.permanent(why))?;
+        let response = client
             .get(self.inner.url.clone())
             .header(header::RANGE, format!("bytes={}-{last}", ask.offset))
             .send()
@@ -225,7 +207,7 @@ impl HttpSource {
     }
 
     fn check_identity(&self, headers: &HeaderMap, total: Option<u64>) -> Result<(), SourceError> {
-        let found = Identity { etag: etag(headers), total };
+        let found = Identity::of(headers, total);
         let first = self.inner.identity.get_or_init(|| found.clone());
         if first.differs_from(&found) {
             return Err(self.changed());
@@ -238,7 +220,7 @@ impl HttpSource {
         let status = response.status();
         match status {
             StatusCode::OK => {
-                let found = Identity { etag: etag(response.headers()), total: None };
+                let found = Identity::of(response.headers(), None);
                 match self.inner.identity.get() {
                     Some(first) if first.differs_from(&found) => self.changed(),
                     // It can answer ranges: this was a bad moment, or a proxy's error page.
@@ -281,7 +263,7 @@ impl HttpSource {
     }
 
     fn changed(&self) -> SourceError {
-        self.permanent("the file was replaced while it was in use; open it again")
+        SourceError::Replaced { place: self.inner.place.clone() }
     }
 
     fn transient(&self, message: impl Into<String>) -> SourceError {
@@ -294,11 +276,20 @@ impl HttpSource {
 }
 
 impl Identity {
+    fn of(headers: &HeaderMap, total: Option<u64>) -> Self {
+        let text = |name| Some(headers.get(name)?.to_str().ok()?.to_owned());
+        Self { etag: text(header::ETAG), modified: text(header::LAST_MODIFIED), total }
+    }
+
     /// Whether both tell, and tell different things.
     fn differs_from(&self, other: &Self) -> bool {
-        let etags = self.etag.as_ref().zip(other.etag.as_ref());
         let totals = self.total.zip(other.total);
-        etags.is_some_and(|(a, b)| a != b) || totals.is_some_and(|(a, b)| a != b)
+        // Where there are tags, they decide: copies of a file on several hosts have several dates.
+        let names = match self.etag.as_ref().zip(other.etag.as_ref()) {
+            Some(etags) => Some(etags),
+            None => self.modified.as_ref().zip(other.modified.as_ref()),
+        };
+        names.is_some_and(|(a, b)| a != b) || totals.is_some_and(|(a, b)| a != b)
     }
 }
 
@@ -317,10 +308,6 @@ impl ContentRange {
     }
 }
 
-fn etag(headers: &HeaderMap) -> Option<String> {
-    Some(headers.get(header::ETAG)?.to_str().ok()?.to_owned())
-}
-
 /// The cause at the bottom: `Connection refused`, where the top says `error sending request`.
 fn innermost(error: &reqwest::Error) -> String {
     let mut cause: &dyn std::error::Error = error;
@@ -328,11 +315,6 @@ fn innermost(error: &reqwest::Error) -> String {
         cause = deeper;
     }
     cause.to_string()
-}
-
-fn is_loopback(url: &Url) -> bool {
-    let host = url.host_str().unwrap_or_default().trim_matches(['[', ']']);
-    host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback())
 }
 
 fn without_secrets(url: &Url) -> String {
@@ -370,7 +352,7 @@ mod tests {
     #[test]
     fn secrets_in_a_url_are_not_shown() {
         let url = Url::parse("https://me:pw@a.example/b.lods?signature=x").expect("a URL");
-        let source = HttpSource::new(url).expect("a client");
+        let source = HttpSource::new(url);
         assert_eq!(source.describe(), "https://a.example/b.lods");
     }
 }

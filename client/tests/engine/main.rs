@@ -3,10 +3,14 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod clouds;
 mod hosts;
 mod jumps;
+mod many;
 mod picture;
 mod precision;
+mod priority;
 mod refinement;
 mod simulated;
+mod soak;
 mod sources;
