@@ -150,6 +150,7 @@ impl Subject {
                         key,
                         spacing,
                         points: Arc::new(points),
+                        part: 0,
                     })?;
                 }
             }

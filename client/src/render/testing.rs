@@ -136,6 +136,7 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
             key,
             spacing: manifest.spacing_world(key.level()) as f32,
             points: Arc::new(node),
+            part: 0,
         }
     });
     TestScene { nodes: nodes.collect(), clouds: vec![Arc::new(manifest)] }

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use lodestream_protocol::{Manifest, NodeKey, NodePoints};
+use lodestream_protocol::{Manifest, NodeKey};
 use lodestream_shaders::CHUNK_POINTS;
 use lru::LruCache;
 
@@ -18,7 +18,7 @@ use super::{
     pack::{RecordFields, RecordLayout, pack},
     ranges::FreeRanges,
 };
-use crate::render::{color::NodeColor, surface::NodeSurface};
+use crate::render::{DrawNode, color::NodeColor, surface::NodeSurface};
 
 /// A page.
 struct Page {
@@ -54,6 +54,8 @@ struct Key {
     /// Address of the manifest: what a cloud is known by as long as anything of it is here.
     cloud: usize,
     node: NodeKey,
+    /// Which of the node's points.
+    part: u64,
     fields: RecordFields,
 }
 
@@ -126,12 +128,14 @@ impl Pool {
         &mut self,
         device: &Device,
         cloud: &Arc<Manifest>,
-        points: &NodePoints,
+        node: &DrawNode,
         fields: RecordFields,
         colors: &NodeColor,
         surface: &NodeSurface,
     ) -> Option<&Resident> {
-        let key = Key { cloud: Arc::as_ptr(cloud).addr(), node: points.key, fields };
+        let points = node.points.as_ref();
+        let address = Arc::as_ptr(cloud).addr();
+        let key = Key { cloud: address, node: points.key, part: node.part, fields };
         if !self.nodes.contains(&key) {
             if self.uploaded_bytes >= self.upload_bytes_per_frame {
                 return None;
