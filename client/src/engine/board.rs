@@ -24,8 +24,13 @@ pub struct CloudStatus {
     pub boot: Option<Arc<Boot>>,
     /// The last trouble with the source, where the last request failed; it is being repeated.
     pub trouble: Option<String>,
-    /// Why the source can no longer be read, where that is so. What is loaded is drawn on.
+    /// Why the source can no longer be read, where that is so. What is loaded is drawn on. A cloud that
+    /// was open is tried again from time to time, others with [`Engine::reopen`](super::Engine::reopen).
     pub failure: Option<String>,
+    /// How often another version of the dataset has been opened in place of the one before.
+    pub replaced: u32,
+    /// Whether the cloud was removed: then there is nothing else to tell.
+    pub removed: bool,
 }
 
 /// What is shown.
@@ -39,6 +44,16 @@ pub(super) struct News {
 }
 
 impl News {
+    /// Changes how a cloud is, unless it was removed.
+    pub fn cloud(&mut self, number: usize, change: impl FnOnce(&mut CloudStatus)) {
+        self.clouds.get_mut(number).filter(|cloud| !cloud.removed).map(change);
+    }
+
+    /// The clouds that were not removed.
+    pub fn present(&self) -> impl Iterator<Item = &CloudStatus> {
+        self.clouds.iter().filter(|cloud| !cloud.removed)
+    }
+
     /// Notes what has failed for good.
     pub fn add_problem(&mut self, line: String) {
         tracing::warn!("{line}");
@@ -56,12 +71,6 @@ pub(super) struct Board {
 }
 
 impl Board {
-    pub fn new(sources: impl Iterator<Item = String>) -> Self {
-        let clouds = sources.map(|source| CloudStatus { source, ..CloudStatus::default() });
-        let news = News { clouds: clouds.collect(), ..News::default() };
-        Self { news: Mutex::new(news), changed: Condvar::new() }
-    }
-
     /// Looks at the news.
     pub fn read<T>(&self, look: impl FnOnce(&News) -> T) -> T {
         look(&self.lock())

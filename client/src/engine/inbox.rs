@@ -7,10 +7,11 @@
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use super::{event::Event, occlusion::Drawn, piece::Piece, view::View};
+use super::{event::Event, occlusion::Drawn, piece::Piece, settings::Settings, view::View};
+use crate::source::Source;
 
 /// What the traversal thread reads.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct TraversalInbox {
     state: Mutex<TraversalMail>,
     news: Condvar,
@@ -19,33 +20,51 @@ pub(super) struct TraversalInbox {
 }
 
 /// The newest of everything.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct TraversalMail {
     /// The view, and how often it has changed.
     pub view: Option<View>,
     /// Wanted attributes, where they have changed.
     pub attributes: Option<Vec<String>>,
-    /// Counts changes of the view and of the attributes.
+    /// The settings.
+    pub settings: Settings,
+    /// Counts changes of the view, the attributes, the settings and the clouds.
     pub generation: u64,
     /// The newest picture, where one has been drawn since.
     pub drawn: Option<Drawn>,
-    /// From the loader, oldest first.
+    /// From the loader, and from the caller where clouds come and go; oldest first.
     pub events: Vec<Event>,
     /// Events ever posted.
     pub posted: u64,
     /// Whether to end.
     pub shutdown: bool,
-    unread_view: bool,
+    /// Whether the view or a setting is new.
+    is_changed: bool,
 }
 
 impl TraversalInbox {
+    pub fn new(settings: Settings) -> Self {
+        let mail = TraversalMail {
+            view: None,
+            attributes: None,
+            settings,
+            generation: 0,
+            drawn: None,
+            events: Vec::new(),
+            posted: 0,
+            shutdown: false,
+            is_changed: false,
+        };
+        Self { state: Mutex::new(mail), news: Condvar::new(), told: tokio::sync::Notify::new() }
+    }
+
     /// Sets the view; the same view again is no news. Calls `changed` with the new generation
     /// before the traversal can see it. Returns the generation.
     pub fn set_view(&self, view: View, changed: impl FnOnce(u64)) -> u64 {
         let mut mail = lock(&self.state);
         if mail.view != Some(view) {
             mail.view = Some(view);
-            mail.unread_view = true;
+            mail.is_changed = true;
             mail.generation += 1;
             changed(mail.generation);
             self.tell();
@@ -61,6 +80,30 @@ impl TraversalInbox {
         changed(mail.generation);
         self.tell();
         mail.generation
+    }
+
+    /// Changes the settings; the same settings again are no news. Returns the generation.
+    pub fn set(&self, change: impl FnOnce(&mut Settings), changed: impl FnOnce(u64)) -> u64 {
+        let mut mail = lock(&self.state);
+        let before = mail.settings.clone();
+        change(&mut mail.settings);
+        if mail.settings != before {
+            mail.is_changed = true;
+            mail.generation += 1;
+            changed(mail.generation);
+            self.tell();
+        }
+        mail.generation
+    }
+
+    /// Posts that a cloud comes or goes.
+    pub fn change_clouds(&self, event: Event, changed: impl FnOnce(u64)) {
+        let mut mail = lock(&self.state);
+        mail.events.push(event);
+        mail.posted += 1;
+        mail.generation += 1;
+        changed(mail.generation);
+        self.tell();
     }
 
     /// Tells of a picture; one that was not read yet is forgotten.
@@ -121,21 +164,22 @@ impl TraversalMail {
         !self.events.is_empty()
             || self.attributes.is_some()
             || self.drawn.is_some()
-            || self.unread_view
+            || self.is_changed
             || self.shutdown
     }
 
     fn collect(&mut self) -> Self {
-        self.unread_view = false;
+        self.is_changed = false;
         Self {
             view: self.view,
             attributes: self.attributes.take(),
+            settings: self.settings.clone(),
             generation: self.generation,
             drawn: self.drawn.take(),
             events: std::mem::take(&mut self.events),
             posted: self.posted,
             shutdown: self.shutdown,
-            unread_view: false,
+            is_changed: false,
         }
     }
 }
@@ -147,6 +191,17 @@ pub(super) struct Demand {
     pub pieces: Vec<Piece>,
     /// Events that the traversal had read when it wrote this.
     pub seen: u64,
+}
+
+/// What the caller wants of the loader.
+#[derive(Debug)]
+pub(super) enum Change {
+    /// Another cloud.
+    Add { cloud: usize, number: usize, source: Source },
+    /// One less.
+    Remove { number: usize },
+    /// Another try to open one, at once.
+    Reopen { number: usize },
 }
 
 /// What the loader thread reads.
@@ -162,6 +217,8 @@ pub(super) struct LoaderInbox {
 pub(super) struct LoaderMail {
     /// Replaces the one before.
     pub demand: Option<Demand>,
+    /// Oldest first.
+    pub changes: Vec<Change>,
     /// Whether to end.
     pub shutdown: bool,
 }
@@ -170,6 +227,12 @@ impl LoaderInbox {
     /// Replaces the demand.
     pub fn set_demand(&self, demand: Demand) {
         lock(&self.state).demand = Some(demand);
+        self.news.notify_one();
+    }
+
+    /// Posts a change.
+    pub fn change(&self, change: Change) {
+        lock(&self.state).changes.push(change);
         self.news.notify_one();
     }
 
@@ -184,8 +247,8 @@ impl LoaderInbox {
         loop {
             {
                 let mut mail = lock(&self.state);
-                if mail.demand.is_some() || mail.shutdown {
-                    return LoaderMail { demand: mail.demand.take(), shutdown: mail.shutdown };
+                if mail.demand.is_some() || !mail.changes.is_empty() || mail.shutdown {
+                    return std::mem::take(&mut *mail);
                 }
             }
             self.news.notified().await;

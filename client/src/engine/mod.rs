@@ -11,6 +11,8 @@
 //! engine knows no GPU: whoever draws takes a [`FramePlan`] and reads its nodes.
 
 mod board;
+mod clip;
+mod clouds;
 mod config;
 mod depth;
 mod drawing;
@@ -24,6 +26,7 @@ mod plan;
 mod policy;
 mod priority;
 mod selection;
+mod settings;
 mod shared;
 mod simulated;
 mod stats;
@@ -37,6 +40,7 @@ use std::{sync::Arc, thread::JoinHandle, time::Duration};
 use lodestream_protocol::Boot;
 
 pub use board::CloudStatus;
+pub use clip::ClipBox;
 pub use config::{Coalesce, EngineConfig, LoadOrder};
 pub use depth::DepthPyramid;
 pub use error::EngineError;
@@ -51,6 +55,7 @@ pub(crate) use view::{Optics, WorldBox};
 
 use self::{
     board::News,
+    inbox::Change,
     loader::Loader,
     occlusion::Drawn,
     shared::{EndOfThread, Shared},
@@ -58,7 +63,8 @@ use self::{
 };
 use crate::source::Source;
 
-/// A running engine. Dropping it ends and joins its threads at once, requests or not.
+/// A running engine. Clouds may come and go, and settings change, while it runs: none of that waits, and
+/// the newest counts. Dropping it ends and joins its threads at once, requests or not.
 #[derive(Debug)]
 pub struct Engine {
     shared: Arc<Shared>,
@@ -66,15 +72,15 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Starts the threads and begins to open the sources; clouds keep the order of `sources`.
+    /// Starts the threads and begins to open the sources; clouds are numbered in the order of `sources`.
     ///
     /// # Errors
     /// [`EngineError::Thread`] where the system gives no thread.
     pub fn start(sources: Vec<Source>, config: EngineConfig) -> Result<Self, EngineError> {
-        let shared = Arc::new(Shared::new(sources.iter().map(Source::describe)));
+        let shared = Arc::new(Shared::new(&config, sources));
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        let traversal = Traversal::new(Arc::clone(&shared), &config, sources.len());
-        let loader = Loader::new(Arc::clone(&shared), config, sources);
+        let traversal = Traversal::new(Arc::clone(&shared), &config);
+        let loader = Loader::new(Arc::clone(&shared), config);
         // From here on, dropping the engine ends whatever threads it has.
         let mut engine = Self { shared, threads: Vec::new() };
         engine.spawn("traversal", || traversal.run())?;
@@ -100,19 +106,38 @@ impl Engine {
         Ok(())
     }
 
-    /// How the clouds are, in the order of the sources.
+    /// Adds a cloud and begins to open it; counts as a new view. Never waits. Returns the cloud's number, by
+    /// which plans and [`clouds`](Self::clouds) know it; no other cloud ever has it.
+    pub fn add(&self, source: Source) -> usize {
+        self.shared.add(source)
+    }
+
+    /// Removes a cloud and forgets all that is loaded of it; counts as a new view. Never waits. The other
+    /// clouds keep their numbers.
+    pub fn remove(&self, cloud: usize) {
+        self.shared.remove(cloud);
+    }
+
+    /// Tries at once to open a cloud that has failed, or failed in parts. Where its dataset has been replaced
+    /// meanwhile, the new one stands in its place. Never waits. (Clouds that were open are tried again
+    /// from time to time without it.)
+    pub fn reopen(&self, cloud: usize) {
+        self.shared.loader.change(Change::Reopen { number: cloud });
+    }
+
+    /// How the clouds are, by number.
     #[must_use]
     pub fn clouds(&self) -> Vec<CloudStatus> {
         self.shared.board.read(|news| news.clouds.clone())
     }
 
-    /// Waits until every cloud's header, manifest and root page are loaded.
+    /// Waits until the header, manifest and root page of every cloud that was not removed are loaded.
     ///
     /// # Errors
     /// [`EngineError::Cloud`] for the first source that can never be read;
     /// [`EngineError::Timeout`] with the last trouble.
     pub fn wait_open(&self, timeout: Duration) -> Result<Vec<Arc<Boot>>, EngineError> {
-        self.wait(timeout, |news| news.clouds.iter().map(|cloud| cloud.boot.clone()).collect())
+        self.wait(timeout, |news| news.present().map(|cloud| cloud.boot.clone()).collect())
     }
 
     /// Sets the view; the newest one counts. Never waits. Returns the view's number, which
@@ -136,6 +161,40 @@ impl Engine {
         self.shared
             .traversal
             .set_attributes(attributes, |generation| self.shared.start_phase(generation))
+    }
+
+    /// Sets the [point budget](EngineConfig::point_budget); another one counts as a new view. Never
+    /// waits.
+    pub fn set_budget(&self, points: u64) -> u64 {
+        self.shared.set(|settings| settings.point_budget = points)
+    }
+
+    /// Sets the [least size of a node](EngineConfig::min_size_px); another one counts as a new view. Never
+    /// waits.
+    pub fn set_min_size_px(&self, min_size_px: f64) -> u64 {
+        self.shared.set(|settings| settings.min_size_px = min_size_px)
+    }
+
+    /// Limits the view to a box; another one counts as a new view. Never waits.
+    pub fn set_clip(&self, clip: Option<ClipBox>) -> u64 {
+        self.shared.set(|settings| settings.clip = clip)
+    }
+
+    /// Sets whether a cloud is to be seen; a change counts as a new view. A cloud that is not takes nothing
+    /// of the budget, and nothing of it is loaded but what opening brings. Never waits.
+    pub fn set_visible(&self, cloud: usize, is_visible: bool) -> u64 {
+        self.shared.set(|settings| {
+            if is_visible {
+                settings.hidden.remove(&cloud);
+            } else {
+                settings.hidden.insert(cloud);
+            }
+        })
+    }
+
+    /// Sets [how much is kept](EngineConfig::cache_bytes); another size counts as a new view. Never waits.
+    pub fn set_cache_bytes(&self, cache_bytes: u64) -> u64 {
+        self.shared.set(|settings| settings.cache_bytes = cache_bytes)
     }
 
     /// The newest plan. Never waits.
@@ -210,9 +269,9 @@ impl Drop for Engine {
 /// What a plan that is not settled waits for.
 fn describe_missing(news: &News) -> String {
     let plan = &news.plan;
-    let closed = news.clouds.iter().filter(|cloud| cloud.boot.is_none()).count();
+    let closed = news.present().filter(|cloud| cloud.boot.is_none()).count();
     let mut missing = if closed > 0 {
-        format!("{closed} of {} sources are not open", news.clouds.len())
+        format!("{closed} of {} sources are not open", news.present().count())
     } else {
         let pages = plan.pages_loading;
         format!("{} nodes and {pages} hierarchy pages are missing", plan.left_out.loading.nodes)

@@ -62,6 +62,8 @@ pub struct SplatReach {
 #[derive(Debug, Clone)]
 pub(super) struct Drawn {
     pub view: View,
+    /// Of the plan.
+    pub sequence: u64,
     /// In order.
     nodes: Vec<NodeId>,
     depth: Arc<DepthPyramid>,
@@ -73,7 +75,7 @@ impl Drawn {
     pub fn new(plan: &FramePlan, depth: Arc<DepthPyramid>, reach: SplatReach) -> Option<Self> {
         let view = plan.view.filter(|view| view.size_px == depth.size_px())?;
         let nodes = in_order(plan.nodes.iter().map(|n| NodeId { cloud: n.cloud, key: n.key }));
-        Some(Self { view, nodes, depth, reach })
+        Some(Self { view, sequence: plan.sequence, nodes, depth, reach })
     }
 
     /// Whether it is a picture of these nodes.

@@ -17,6 +17,7 @@ use std::{
 use lodestream_protocol::{Lattice, LatticeBox, Node, NodeKey, Refinement};
 
 use super::{
+    clip::ClipBox,
     occlusion::{Occluders, Suspect},
     piece::NodeId,
     plan::{LeftOut, Tally},
@@ -37,6 +38,7 @@ pub(super) struct Limits {
     pub min_size_px: f64,
     pub culls_outside: bool,
     pub priority: Priority,
+    pub clip: Option<ClipBox>,
 }
 
 /// A wanted node.
@@ -145,6 +147,7 @@ impl Eq for Candidate {}
 
 /// How a node stands in the view.
 enum Sight {
+    Clipped,
     Outside,
     Hidden,
     Small { priority: f64 },
@@ -168,6 +171,7 @@ impl Walk<'_> {
         // The root has no parent to stand for it: it is shown however small it is.
         match self.look(cloud, &place.node, None) {
             Sight::Hidden => {}
+            Sight::Clipped => self.out.left_out.clipped.add(place.node.points),
             Sight::Outside => self.out.left_out.outside.add(place.node.points),
             Sight::Small { priority } | Sight::Seen { priority } => {
                 self.push(cloud, &place.node.clone(), priority, What::Node { place, parent: None });
@@ -312,6 +316,7 @@ impl Walk<'_> {
         let above = Arc::clone(&self.out.picks[parent].node);
         for place in children {
             match self.look(cloud, &place.node, Some(&above)) {
+                Sight::Clipped => self.out.left_out.clipped.add(place.node.points),
                 Sight::Outside => self.out.left_out.outside.add(place.node.points),
                 Sight::Hidden => self.out.left_out.hidden.add(place.node.points),
                 Sight::Small { .. } => self.out.left_out.small.add(place.node.points),
@@ -332,6 +337,7 @@ impl Walk<'_> {
         let mut most: Option<f64> = None;
         for place in children {
             match self.look(cloud, &place.node, Some(&above)) {
+                Sight::Clipped => self.out.left_out.clipped.add(place.node.points),
                 Sight::Outside => self.out.left_out.outside.add(place.node.points),
                 Sight::Hidden => self.out.left_out.hidden.add(place.node.points),
                 Sight::Small { priority } => {
@@ -355,6 +361,10 @@ impl Walk<'_> {
         }
     }
 
+    fn is_clipped(&self, bounds: &WorldBox) -> bool {
+        self.limits.clip.is_some_and(|clip| clip.excludes(bounds))
+    }
+
     fn is_outside(&self, bounds: &WorldBox) -> bool {
         self.limits.culls_outside && self.optics.is_outside(bounds)
     }
@@ -364,6 +374,9 @@ impl Walk<'_> {
         let Some(tree) = &self.trees[cloud] else { return Sight::Outside };
         let lattice = &tree.boot().manifest.lattice;
         let bounds = WorldBox::of(&node.bounds, lattice);
+        if self.is_clipped(&bounds) {
+            return Sight::Clipped;
+        }
         if self.is_outside(&bounds) {
             return Sight::Outside;
         }
@@ -417,7 +430,9 @@ impl Walk<'_> {
             let octant = WorldBox::of(&octant, lattice);
             let cube = cube_radius(lattice.node_side_world(key.level()));
             let largest = HYSTERESIS * self.optics.largest_projected_size(&octant, cube);
-            !self.is_outside(&octant) && largest >= self.limits.min_size_px
+            !self.is_clipped(&octant)
+                && !self.is_outside(&octant)
+                && largest >= self.limits.min_size_px
         })
     }
 }
@@ -591,6 +606,7 @@ mod tests {
         min_size_px: 20.0,
         culls_outside: true,
         priority: Priority::ErrorPerByte,
+        clip: None,
     };
 
     /// Of a forest, wanting the only group.

@@ -65,6 +65,26 @@ impl Store {
         }
     }
 
+    /// Changes the limit; the next [`pin`](Self::pin) keeps to it.
+    pub fn set_cache_limit(&mut self, bytes: u64) {
+        self.cache_limit = bytes;
+    }
+
+    /// Forgets all of a cloud.
+    pub fn forget(&mut self, cloud: usize) {
+        for (_, resident) in self.pinned.extract_if(|id, _| id.cloud == cloud) {
+            self.pinned_bytes -= resident.bytes;
+        }
+        let of_cloud = self.cached.iter().map(|(id, _)| *id).filter(|id| id.cloud == cloud);
+        for id in of_cloud.collect::<Vec<_>>() {
+            if let Some(resident) = self.cached.pop(&id) {
+                self.cached_bytes -= resident.bytes;
+            }
+        }
+        self.fresh.retain(|id| id.cloud != cloud);
+        self.find(cloud);
+    }
+
     /// Adds a decoded group. Call [`pin`](Self::pin) afterwards: until then it counts as cached.
     pub fn add(&mut self, id: NodeId, group: usize, decoded: DecodedGroup) {
         let (resident, total) = if let Some(resident) = self.pinned.get_mut(&id) {
@@ -142,6 +162,11 @@ impl Store {
         self.lost.insert(id);
     }
 
+    /// What was lost of a cloud may be had after all.
+    pub fn find(&mut self, cloud: usize) {
+        self.lost.retain(|id| id.node.cloud != cloud);
+    }
+
     /// Whether a piece can never be had.
     pub fn is_lost(&self, id: PieceId) -> bool {
         self.lost.contains(&id)
@@ -171,6 +196,7 @@ mod tests {
     use lodestream_protocol::{Column, NodeKey};
 
     use super::*;
+    use crate::engine::piece::Part;
 
     fn id(octant: u8) -> NodeId {
         NodeId { cloud: 0, key: NodeKey::ROOT.child(octant).expect("below the root") }
@@ -207,6 +233,20 @@ mod tests {
         store.pin(&HashSet::from([id(1)]));
         assert_eq!((store.pinned_bytes(), store.cached_bytes()), (120, 0));
         assert!(store.points(id(1)).is_some());
+    }
+
+    #[test]
+    fn a_forgotten_cloud_leaves_nothing_and_the_others_alone() {
+        let mut store = store(1000, 2);
+        let other = NodeId { cloud: 1, ..id(0) };
+        store.add(other, 0, base(10));
+        store.lose(PieceId { node: id(3), part: Part::Page });
+        store.pin(&HashSet::from([id(0), other]));
+        store.forget(0);
+        assert_eq!((store.pinned_bytes(), store.cached_bytes()), (120, 0));
+        assert!(store.points(other).is_some() && store.groups(id(0)) == 0 && !store.has_lost());
+        store.forget(1);
+        assert_eq!((store.pinned_bytes(), store.cached_bytes()), (0, 0));
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub(super) struct Tree {
     pages: HashMap<PageId, Page>,
     nodes: usize,
     walk: u64,
+    is_hidden: bool,
 }
 
 #[derive(Debug)]
@@ -48,7 +49,7 @@ pub(super) enum Children {
 
 impl Tree {
     pub fn new(boot: Arc<Boot>) -> Self {
-        let mut tree = Self { pages: HashMap::new(), nodes: 0, walk: 0, boot };
+        let mut tree = Self { pages: HashMap::new(), nodes: 0, walk: 0, is_hidden: false, boot };
         let root_page = tree.boot.root_page.clone();
         tree.insert(None, root_page);
         tree
@@ -56,6 +57,11 @@ impl Tree {
 
     pub fn boot(&self) -> &Arc<Boot> {
         &self.boot
+    }
+
+    /// Whether walks find nothing, because the cloud is not to be seen.
+    pub fn hide(&mut self, is_hidden: bool) {
+        self.is_hidden = is_hidden;
     }
 
     /// Adds the page below `parent`.
@@ -73,8 +79,11 @@ impl Tree {
     }
 
     /// Starts a walk from the root; drops pages that the last one did not touch, if there are too
-    /// many nodes. `None` where the cloud has no points.
+    /// many nodes. `None` where the cloud has no points or is hidden.
     pub fn start_walk(&mut self) -> Option<Place> {
+        if self.is_hidden {
+            return None;
+        }
         if self.nodes > MAX_NODES {
             self.drop_untouched_pages();
         }

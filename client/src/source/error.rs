@@ -11,6 +11,13 @@ pub enum SourceError {
         /// What happened.
         message: String,
     },
+    /// The file is no longer the one that was opened: nothing more of that one can be had.
+    /// [`Source::renew`](super::Source::renew) makes a source of the one that is there now.
+    #[error("{place}: the file was replaced while it was in use; open it again")]
+    Replaced {
+        /// The source, as [`Source::describe`](super::Source::describe) names it.
+        place: String,
+    },
     /// Trying again cannot help; the message says what would.
     #[error("{place}: {message}")]
     Permanent {

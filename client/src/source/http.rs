@@ -55,6 +55,8 @@ struct Inner {
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Identity {
     etag: Option<String>,
+    /// `Last-Modified`, for hosts that have no entity tags.
+    modified: Option<String>,
     total: Option<u64>,
 }
 
@@ -104,6 +106,13 @@ impl HttpSource {
             .build()
             .map_err(|e| SourceError::permanent(&place, format!("no HTTP client: {e}")))?;
         Ok(Self { inner: Arc::new(Inner { client, url, place, identity: OnceLock::new() }) })
+    }
+
+    /// A source of whatever lies at the URL now. Shares connections.
+    pub(super) fn renew(&self) -> Self {
+        let Inner { client, url, place, .. } = &*self.inner;
+        let (client, url, place) = (client.clone(), url.clone(), place.clone());
+        Self { inner: Arc::new(Inner { client, url, place, identity: OnceLock::new() }) }
     }
 
     /// The URL, with whatever secrets it holds.
@@ -225,7 +234,7 @@ impl HttpSource {
     }
 
     fn check_identity(&self, headers: &HeaderMap, total: Option<u64>) -> Result<(), SourceError> {
-        let found = Identity { etag: etag(headers), total };
+        let found = Identity::of(headers, total);
         let first = self.inner.identity.get_or_init(|| found.clone());
         if first.differs_from(&found) {
             return Err(self.changed());
@@ -238,7 +247,7 @@ impl HttpSource {
         let status = response.status();
         match status {
             StatusCode::OK => {
-                let found = Identity { etag: etag(response.headers()), total: None };
+                let found = Identity::of(response.headers(), None);
                 match self.inner.identity.get() {
                     Some(first) if first.differs_from(&found) => self.changed(),
                     // It can answer ranges: this was a bad moment, or a proxy's error page.
@@ -281,7 +290,7 @@ impl HttpSource {
     }
 
     fn changed(&self) -> SourceError {
-        self.permanent("the file was replaced while it was in use; open it again")
+        SourceError::Replaced { place: self.inner.place.clone() }
     }
 
     fn transient(&self, message: impl Into<String>) -> SourceError {
@@ -294,11 +303,20 @@ impl HttpSource {
 }
 
 impl Identity {
+    fn of(headers: &HeaderMap, total: Option<u64>) -> Self {
+        let text = |name| Some(headers.get(name)?.to_str().ok()?.to_owned());
+        Self { etag: text(header::ETAG), modified: text(header::LAST_MODIFIED), total }
+    }
+
     /// Whether both tell, and tell different things.
     fn differs_from(&self, other: &Self) -> bool {
-        let etags = self.etag.as_ref().zip(other.etag.as_ref());
         let totals = self.total.zip(other.total);
-        etags.is_some_and(|(a, b)| a != b) || totals.is_some_and(|(a, b)| a != b)
+        // Where there are tags, they decide: copies of a file on several hosts have several dates.
+        let names = match self.etag.as_ref().zip(other.etag.as_ref()) {
+            Some(etags) => Some(etags),
+            None => self.modified.as_ref().zip(other.modified.as_ref()),
+        };
+        names.is_some_and(|(a, b)| a != b) || totals.is_some_and(|(a, b)| a != b)
     }
 }
 
@@ -315,10 +333,6 @@ impl ContentRange {
         let end = last.checked_add(1)?;
         (start < end && total.is_none_or(|t| end <= t)).then_some(Self { start, end, total })
     }
-}
-
-fn etag(headers: &HeaderMap) -> Option<String> {
-    Some(headers.get(header::ETAG)?.to_str().ok()?.to_owned())
 }
 
 /// The cause at the bottom: `Connection refused`, where the top says `error sending request`.

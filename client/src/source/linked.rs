@@ -20,6 +20,11 @@ impl LinkedSource {
         Self { file, link }
     }
 
+    /// The file that lies there now, behind the same link.
+    pub(super) fn renew(&self) -> Result<Self, SourceError> {
+        Ok(Self { file: self.file.renew()?, link: Arc::clone(&self.link) })
+    }
+
     pub(super) fn describe(&self) -> String {
         format!("{} by {}", self.file.describe(), self.link.spec())
     }

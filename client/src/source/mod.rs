@@ -90,6 +90,18 @@ impl Source {
         }
     }
 
+    /// A source of whatever lies at the same place now, after [`SourceError::Replaced`].
+    ///
+    /// # Errors
+    /// [`SourceError::Permanent`] where there is nothing any more.
+    pub fn renew(&self) -> Result<Self, SourceError> {
+        Ok(match self {
+            Self::Http(source) => Self::Http(source.renew()),
+            Self::File(source) => Self::File(source.renew()?),
+            Self::Linked(source) => Self::Linked(source.renew()?),
+        })
+    }
+
     /// Hands exactly `len` bytes from `offset` to `sink`, piece by piece as they arrive.
     ///
     /// Pieces that were handed out before an error are good.

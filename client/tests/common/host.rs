@@ -43,6 +43,8 @@ pub enum Answer {
     Garbage,
     /// As good, with this entity tag.
     Tagged(&'static str),
+    /// As good, with this date instead of an entity tag.
+    Dated(&'static str),
     /// Closes the connection without an answer.
     Close,
 }
@@ -85,6 +87,11 @@ impl Host {
     /// Changes how requests are answered from now on.
     pub fn behave(&self, manners: impl FnMut(Request) -> Answer + Send + 'static) {
         self.state.lock().expect("no panic").manners = Box::new(manners);
+    }
+
+    /// Serves another file from now on.
+    pub fn replace(&self, file: Vec<u8>) {
+        self.state.lock().expect("no panic").file = file;
     }
 
     /// Requests seen so far.
@@ -225,6 +232,13 @@ async fn reply(
         }
         Answer::Tagged(tag) => {
             send(stream, &head(206, end - start, Some((start, end, len)), tag)).await?;
+            send(stream, &body).await
+        }
+        Answer::Dated(date) => {
+            let mut dated = head(206, end - start, Some((start, end, len)), "");
+            let line = format!("Last-Modified: {date}\r\n\r\n");
+            dated.splice(dated.len() - 2.., line.into_bytes());
+            send(stream, &dated).await?;
             send(stream, &body).await
         }
         _ => {

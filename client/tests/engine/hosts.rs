@@ -233,18 +233,6 @@ fn a_dataset_that_is_not_there_is_an_error() {
 }
 
 #[test]
-fn a_file_that_is_replaced_while_in_use_is_an_error() {
-    let recipe = Recipe::default();
-    let host = Host::start(dataset(recipe), |request| match request.number {
-        0 => Answer::Good,
-        _ => Answer::Tagged("\"second\""),
-    });
-    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
-    engine.set_view(overview(recipe.corner));
-    assert!(failure(&engine).contains("replaced"));
-}
-
-#[test]
 fn what_is_no_dataset_is_an_error() {
     let mut cut = dataset(Recipe::default());
     cut.truncate(cut.len() - 10);

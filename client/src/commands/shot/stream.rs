@@ -88,7 +88,7 @@ impl Stream {
         plan: &FramePlan,
         settings: &RenderSettings,
     ) -> Result<Frame, RenderError> {
-        let scene = Scene { clouds: &self.clouds, nodes: &plan.nodes };
+        let scene = Scene { clouds: &plan.clouds, nodes: &plan.nodes };
         self.renderer.render(&scene, settings, &mut |e| tell(e, &mut self.fallback))
     }
 

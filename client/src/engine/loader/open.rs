@@ -24,38 +24,41 @@ pub struct Opening {
 }
 
 /// Opens `source`, trying again for as long as that may help; asks for `speculative` bytes at first.
-/// Whenever more of them has come, it is told.
+/// Whenever more of them has come, it is told, and which source they are of: where the file is replaced
+/// meanwhile, that is another one. `number` is the cloud's for the caller.
 ///
 /// # Errors
 /// What is wrong for good, with the source's name.
 pub async fn open(
     shared: &Shared,
-    cloud: usize,
-    source: &Source,
+    number: usize,
+    mut source: Source,
     speculative: u64,
-    tell: impl Fn(Opening) + Send + Sync,
+    tell: impl Fn(&Source, Opening) + Send + Sync,
 ) -> Result<(), String> {
     let mut failures = 0;
     loop {
         let mut reader = Reader { boot: None, bytes: BytesMut::new(), announced: None };
-        match reader.read(shared, source, speculative, &tell).await {
+        let told = |opening| tell(&source, opening);
+        let error = match reader.read(shared, &source, speculative, &told).await {
             Ok(()) => {
-                shared.board.post(|news| news.clouds[cloud].trouble = None);
+                shared.trouble(Some(number), None);
                 return Ok(());
             }
-            Err(Failure::Source(error)) if error.is_transient() => {
-                // What has come is good; the rest is asked for as everything else is.
-                if reader.end(&tell) {
-                    return Ok(());
-                }
-                failures += 1;
-                shared.counters.retries.add(1);
-                shared.board.post(|news| news.clouds[cloud].trouble = Some(error.to_string()));
-                tokio::time::sleep(Backoff::default().delay(failures)).await;
-            }
-            Err(Failure::Source(error)) => return Err(error.to_string()),
             Err(Failure::Format(error)) => return Err(format!("{}: {error}", source.describe())),
+            Err(Failure::Source(error)) => error,
+        };
+        match error {
+            // What has come is good; the rest is asked for as everything else is.
+            SourceError::Transient { .. } if reader.end(&told) => return Ok(()),
+            SourceError::Transient { .. } => {}
+            SourceError::Replaced { .. } => source = source.renew().map_err(|e| e.to_string())?,
+            SourceError::Permanent { .. } => return Err(error.to_string()),
         }
+        failures += 1;
+        shared.counters.retries.add(1);
+        shared.trouble(Some(number), Some(error.to_string()));
+        tokio::time::sleep(Backoff::default().delay(failures)).await;
     }
 }
 
