@@ -4,7 +4,7 @@
 //! mutex what it waits for, so no news is missed.
 
 use std::{
-    sync::{Arc, Condvar, Mutex, MutexGuard},
+    sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock},
     time::{Duration, Instant},
 };
 
@@ -63,11 +63,21 @@ impl News {
     }
 }
 
+/// What is called when there is news.
+struct Waker(Box<dyn Fn() + Send + Sync>);
+
+impl std::fmt::Debug for Waker {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str("Waker")
+    }
+}
+
 /// The board.
 #[derive(Debug, Default)]
 pub(super) struct Board {
     news: Mutex<News>,
     changed: Condvar,
+    waker: OnceLock<Waker>,
 }
 
 impl Board {
@@ -80,7 +90,16 @@ impl Board {
     pub fn post<T>(&self, change: impl FnOnce(&mut News) -> T) -> T {
         let result = change(&mut self.lock());
         self.changed.notify_all();
+        if let Some(Waker(wake)) = self.waker.get() {
+            wake();
+        }
         result
+    }
+
+    /// Calls `wake` after every change from now on, on the thread that made it. The first one stays.
+    pub fn wake_by(&self, wake: impl Fn() + Send + Sync + 'static) {
+        // A second one would be a mistake of the one caller there is.
+        let _ = self.waker.set(Waker(Box::new(wake)));
     }
 
     /// Waits until `look` finds what it looks for; `None` where the time runs out.
