@@ -39,14 +39,14 @@ pub struct Look {
 }
 
 impl Default for Look {
-    /// Circles that close the surface, however much of it has come.
+    /// Circles that close the surface as it comes, but never hide how fine it is.
     fn default() -> Self {
-        let (limits, dome) = (SizeLimits::default(), EyeDome::default());
+        let dome = EyeDome::default();
         Self {
             splat: Splat::Circle,
             splat_size: SplatSize::Adaptive(1.6),
-            min_splat_px: limits.min_px,
-            max_splat_px: 64.0,
+            min_splat_px: 2.0,
+            max_splat_px: 8.0,
             color: ColorMode::Rgb,
             phong: false,
             eye_dome: false,

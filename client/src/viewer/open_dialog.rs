@@ -119,7 +119,7 @@ impl Viewer {
                 ui.horizontal(|ui| {
                     let field = egui::TextEdit::singleline(&mut dialog.text)
                         .hint_text("127.0.0.1:8080/courtyard")
-                        .desired_width(330.0);
+                        .desired_width(316.0);
                     let field = ui.add(field);
                     if dialog.text.is_empty()
                         && ui.ctx().memory(|memory| memory.focused().is_none())

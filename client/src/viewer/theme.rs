@@ -73,7 +73,7 @@ pub fn apply(context: &egui::Context, theme: Theme) {
         spacing.item_spacing = egui::vec2(8.0, 6.0);
         spacing.button_padding = egui::vec2(9.0, 4.0);
         spacing.interact_size = egui::vec2(36.0, 24.0);
-        spacing.slider_width = 128.0;
+        spacing.slider_width = 104.0;
         spacing.slider_rail_height = 5.0;
         spacing.combo_width = 128.0;
         spacing.indent = 14.0;

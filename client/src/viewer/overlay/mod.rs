@@ -5,6 +5,7 @@ mod clip_edges;
 mod marks;
 mod message_lines;
 mod north;
+mod point_card;
 mod projector;
 mod scale_bar;
 
@@ -35,6 +36,7 @@ pub fn show(viewer: &mut Viewer, ui: &mut Ui, palette: Palette) {
         axes::draw(viewer, &painter, palette);
         north::draw(viewer, &painter, palette);
     }
+    point_card::show(viewer, ui, palette);
     message_lines::show(viewer, ui, palette);
 }
 

@@ -65,7 +65,7 @@ pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
         }
         SplatSize::Level(times) | SplatSize::Adaptive(times) => {
             field(ui, palette, "", |ui| {
-                ui.add(Slider::new(times, 0.2..=8.0).logarithmic(true).suffix(" spacings"))
+                ui.add(Slider::new(times, 0.2..=8.0).logarithmic(true).suffix(" x"))
             });
         }
         SplatSize::Own => {}

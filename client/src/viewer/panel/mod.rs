@@ -5,7 +5,6 @@ mod clip;
 mod clouds;
 mod detail;
 mod left_out;
-mod points;
 mod session;
 mod statistics;
 mod views;
@@ -25,7 +24,7 @@ use super::{
 const WIDTH: f32 = 316.0;
 
 /// Width of what is told before widgets.
-const LABEL_WIDTH: f32 = 92.0;
+const LABEL_WIDTH: f32 = 88.0;
 
 /// Narrower windows have no panel: the picture comes first.
 const NARROWEST: f32 = 560.0;
@@ -181,7 +180,6 @@ fn side_panel(viewer: &mut Viewer, ui: &mut Ui) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.set_max_width(WIDTH - 30.0);
             section(ui, "Clouds", true, |ui| clouds::show(viewer, ui));
-            section(ui, "Point", true, |ui| points::show(viewer, ui));
             section(ui, "Look", true, |ui| appearance::show(viewer, ui));
             section(ui, "Detail", true, |ui| detail::show(viewer, ui));
             section(ui, "Clip box", viewer.clip.is_on, |ui| clip::show(viewer, ui));
@@ -208,7 +206,7 @@ fn section(ui: &mut Ui, title: &str, is_open: bool, contents: impl FnOnce(&mut U
 }
 
 /// A line of a table: what, and how much.
-fn row(ui: &mut Ui, palette: Palette, what: &str, value: impl Into<String>) {
+pub(super) fn row(ui: &mut Ui, palette: Palette, what: &str, value: impl Into<String>) {
     ui.horizontal(|ui| {
         ui.label(RichText::new(what).color(palette.faint));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -265,7 +263,7 @@ pub fn show_help(viewer: &mut Viewer, context: &egui::Context) {
                 });
             };
             let room = context.content_rect().size() - egui::vec2(80.0, 130.0);
-            ScrollArea::both().min_scrolled_height(room.y).max_width(room.x).show(ui, tables);
+            ScrollArea::vertical().min_scrolled_height(room.y).max_height(room.y).show(ui, tables);
         });
     viewer.shows_help &= is_open;
 }
