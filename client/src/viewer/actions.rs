@@ -273,6 +273,7 @@ impl Viewer {
             Some(ClipBox { min, max })
         });
         self.clip = Clip { is_on: is_on && bounds.is_some(), bounds };
+        self.opens_clip = self.clip.is_on;
     }
 
     /// Keeps the view.

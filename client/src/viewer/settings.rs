@@ -82,8 +82,8 @@ impl Settings {
     /// Where they are kept, unless the command line says otherwise; `None` where the user has no home.
     #[must_use]
     pub fn usual_path() -> Option<PathBuf> {
-        let folders = directories::ProjectDirs::from("", "", "lodestream")?;
-        Some(folders.config_dir().join("viewer.json"))
+        let folders = etcetera::choose_base_strategy().ok()?;
+        Some(etcetera::BaseStrategy::config_dir(&folders).join("lodestream/viewer.json"))
     }
 
     /// Reads them. What is wrong with a file never stops the program: it is put aside as

@@ -1,6 +1,6 @@
 //! The part of the window that shows the picture, and what hands do there.
 
-use egui::{PointerButton, Rect, Response, Sense, Ui, Vec2};
+use egui::{Event, PointerButton, Rect, Response, Sense, Ui, Vec2};
 use glam::{DVec2, DVec3};
 
 use super::{
@@ -17,6 +17,16 @@ const WHEEL_POINTS: f64 = 40.0;
 
 /// Longest time that a step of walking may take: after a stall nobody is thrown across the scene.
 const LONGEST_STEP: f64 = 0.1;
+
+/// A hand that holds a button down.
+#[derive(Debug, Clone, Copy)]
+pub struct Drag {
+    /// Where it is.
+    at: egui::Pos2,
+    button: PointerButton,
+    /// Whether it turns the camera; else it moves along the picture.
+    turns: bool,
+}
 
 impl Viewer {
     /// Shows the picture and obeys hands; returns whether somebody walks.
@@ -56,17 +66,41 @@ impl Viewer {
         DVec2::new(f64::from(moved.x), -f64::from(moved.y)) / height
     }
 
-    fn obey_pointer(&mut self, ui: &Ui, response: &Response) {
-        let moved = self.parts(response.drag_delta());
-        if moved != DVec2::ZERO {
-            let shift = ui.input(|input| input.modifiers.shift);
-            self.take_over();
-            if response.dragged_by(PointerButton::Primary) && !shift {
-                // Down is nearer to the ground: the scene follows the hand.
-                self.navigator.turn(moved);
-            } else {
-                self.navigator.pan(moved);
+    /// How far the hand has dragged since the last frame, to turn and to pan. Taken from the events
+    /// themselves: where a frame takes long, a whole drag may lie between two of them.
+    fn dragged(&mut self, ui: &Ui) -> (Vec2, Vec2) {
+        let (mut turned, mut panned) = (Vec2::ZERO, Vec2::ZERO);
+        let events = ui.input(|input| input.events.clone());
+        for event in events {
+            match event {
+                Event::PointerButton { pos, button, pressed: true, modifiers } => {
+                    let is_here = self.view_rect.contains(pos)
+                        && ui.ctx().layer_id_at(pos) == Some(ui.layer_id());
+                    let turns = button == PointerButton::Primary && !modifiers.shift;
+                    self.drag = is_here.then_some(Drag { at: pos, button, turns });
+                }
+                Event::PointerButton { button, pressed: false, .. } => {
+                    self.drag.take_if(|drag| drag.button == button);
+                }
+                Event::PointerMoved(pos) => {
+                    if let Some(drag) = &mut self.drag {
+                        let moved = pos - std::mem::replace(&mut drag.at, pos);
+                        *if drag.turns { &mut turned } else { &mut panned } += moved;
+                    }
+                }
+                Event::PointerGone | Event::WindowFocused(false) => self.drag = None,
+                _ => {}
             }
+        }
+        (turned, panned)
+    }
+
+    fn obey_pointer(&mut self, ui: &Ui, response: &Response) {
+        let (turned, panned) = self.dragged(ui);
+        if turned != Vec2::ZERO || panned != Vec2::ZERO {
+            self.take_over();
+            self.navigator.turn(self.parts(turned));
+            self.navigator.pan(self.parts(panned));
         }
         if response.hovered() {
             self.obey_wheel(ui, response);

@@ -101,6 +101,8 @@ pub struct Viewer {
     /// Where pictures go.
     pub folder: PathBuf,
     pub clip: Clip,
+    /// The clip box was switched on: its section is to be opened.
+    pub opens_clip: bool,
     pub bookmarks: Vec<Bookmark>,
     pub measurements: Vec<Measurement>,
     pub tool: Tool,
@@ -137,6 +139,8 @@ pub struct Viewer {
     pub size_px: [u32; 2],
     /// The camera of the last picture.
     pub camera: Camera,
+    /// A drag under way.
+    pub drag: Option<super::view::Drag>,
     /// The view that nobody has chosen yet is of this extent, in a picture of this aspect.
     pub first_view: Option<(DVec3, DVec3, f64)>,
     /// What is zoomed to: the place under the cursor, as long as that is where it was.
@@ -181,6 +185,7 @@ impl Viewer {
             settings_file: options.settings_file.take(),
             folder: options.folder.clone(),
             clip: Clip { is_on: options.clip.is_some(), bounds: options.clip },
+            opens_clip: false,
             bookmarks: Vec::new(),
             measurements: Vec::new(),
             tool: Tool::default(),
@@ -211,6 +216,7 @@ impl Viewer {
             view_rect: egui::Rect::NOTHING,
             size_px: [1, 1],
             camera: Camera::overview(DVec3::ZERO, DVec3::ONE, 1.5),
+            drag: None,
             first_view: None,
             anchor: None,
         };

@@ -144,7 +144,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     // Fly: ahead, along the view direction.
     window.keys(&["g"]);
     window.hold("w", "0.4");
-    let flown = window.wait("settled", |event| distance(eye(event), eye(&pivoted)) > 0.2);
+    let flown = window.wait("settled", |event| distance(eye(event), eye(&pivoted)) > 0.02);
     let ahead = moved(target(&pivoted), eye(&pivoted));
     let way = moved(eye(&flown), eye(&pivoted));
     let along: f64 = (0..3).map(|i| ahead[i] * way[i]).sum();

@@ -179,10 +179,13 @@ fn side_panel(viewer: &mut Viewer, ui: &mut Ui) {
     Panel::left("panel").frame(frame).exact_size(WIDTH).resizable(false).show(ui, |ui| {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.set_max_width(WIDTH - 30.0);
+            let opens_clip = std::mem::take(&mut viewer.opens_clip);
             section(ui, "Clouds", true, |ui| clouds::show(viewer, ui));
             section(ui, "Look", true, |ui| appearance::show(viewer, ui));
             section(ui, "Detail", true, |ui| detail::show(viewer, ui));
-            section(ui, "Clip box", viewer.clip.is_on, |ui| clip::show(viewer, ui));
+            let is_clipped = viewer.clip.is_on;
+            let clip = header("Clip box", is_clipped).open(opens_clip.then_some(true));
+            show_section(ui, clip, |ui| clip::show(viewer, ui));
             section(ui, "Views and paths", false, |ui| views::show(viewer, ui));
             section(ui, "Session", false, |ui| session::show(viewer, ui));
             section(ui, "Statistics", false, |ui| statistics::show(viewer, ui));
@@ -193,15 +196,21 @@ fn side_panel(viewer: &mut Viewer, ui: &mut Ui) {
 }
 
 fn section(ui: &mut Ui, title: &str, is_open: bool, contents: impl FnOnce(&mut Ui)) {
+    show_section(ui, header(title, is_open), contents);
+}
+
+fn header(title: &str, is_open: bool) -> CollapsingHeader {
+    let text = RichText::new(title).strong().size(14.5);
+    CollapsingHeader::new(text).id_salt(title).default_open(is_open)
+}
+
+fn show_section(ui: &mut Ui, header: CollapsingHeader, contents: impl FnOnce(&mut Ui)) {
     ui.add_space(4.0);
-    CollapsingHeader::new(RichText::new(title).strong().size(14.5))
-        .id_salt(title)
-        .default_open(is_open)
-        .show_unindented(ui, |ui| {
-            ui.add_space(1.0);
-            contents(ui);
-            ui.add_space(5.0);
-        });
+    header.show_unindented(ui, |ui| {
+        ui.add_space(1.0);
+        contents(ui);
+        ui.add_space(5.0);
+    });
     ui.separator();
 }
 
