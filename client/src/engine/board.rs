@@ -1,16 +1,13 @@
 //! What the engine shows to the outside: the newest plan and how the clouds are.
-//!
-//! One mutex, held for a few moves only, and one condition variable: whoever waits checks under the
-//! mutex what it waits for, so no news is missed.
 
 use std::{
-    sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock},
-    time::{Duration, Instant},
+    sync::{Arc, OnceLock},
+    time::Duration,
 };
 
 use lodestream_protocol::Boot;
 
-use super::plan::FramePlan;
+use super::{notice::Notice, plan::FramePlan};
 
 /// Most lines about what has failed.
 const MAX_PROBLEMS: usize = 100;
@@ -72,24 +69,22 @@ impl std::fmt::Debug for Waker {
     }
 }
 
-/// The board.
+/// The board, and who is woken by it without waiting for it.
 #[derive(Debug, Default)]
 pub(super) struct Board {
-    news: Mutex<News>,
-    changed: Condvar,
+    notice: Notice<News>,
     waker: OnceLock<Waker>,
 }
 
 impl Board {
     /// Looks at the news.
     pub fn read<T>(&self, look: impl FnOnce(&News) -> T) -> T {
-        look(&self.lock())
+        self.notice.read(look)
     }
 
     /// Changes the news and wakes those who wait.
     pub fn post<T>(&self, change: impl FnOnce(&mut News) -> T) -> T {
-        let result = change(&mut self.lock());
-        self.changed.notify_all();
+        let result = self.notice.post(change);
         if let Some(Waker(wake)) = self.waker.get() {
             wake();
         }
@@ -103,35 +98,7 @@ impl Board {
     }
 
     /// Waits until `look` finds what it looks for; `None` where the time runs out.
-    pub fn wait<T>(
-        &self,
-        timeout: Duration,
-        mut look: impl FnMut(&News) -> Option<T>,
-    ) -> Option<T> {
-        let deadline = Instant::now().checked_add(timeout);
-        let mut news = self.lock();
-        loop {
-            if let Some(found) = look(&news) {
-                return Some(found);
-            }
-            // Without a deadline the timeout is longer than the clock can tell.
-            let left = match deadline {
-                Some(deadline) => deadline.saturating_duration_since(Instant::now()),
-                None => Duration::MAX,
-            };
-            if left.is_zero() {
-                return None;
-            }
-            news = match self.changed.wait_timeout(news, left) {
-                Ok((news, _)) => news,
-                Err(poisoned) => poisoned.into_inner().0,
-            };
-        }
-    }
-
-    /// A thread that panicked while it held the lock leaves whole values behind: every change is a
-    /// move.
-    fn lock(&self) -> MutexGuard<'_, News> {
-        self.news.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    pub fn wait<T>(&self, timeout: Duration, look: impl FnMut(&News) -> Option<T>) -> Option<T> {
+        self.notice.wait(timeout, look)
     }
 }

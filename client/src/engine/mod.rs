@@ -6,9 +6,11 @@
 //! - the traversal thread (`traversal.rs`): decides what is drawn and what is loaded;
 //! - the loader thread (`loader/`): requests, decoding, retries.
 //!
-//! They talk through two letter boxes (`inbox.rs`) and one board (`board.rs`). The view and the
+//! They talk through two letter boxes (`inbox.rs`) and one board (`board.rs`), in which no news can be lost
+//! (`mailbox.rs`, `notice.rs`; a model checker tries them in every order). The view, the settings and the
 //! demand are latest-wins, everything else is bounded. With nothing to do, all threads sleep. The
-//! engine knows no GPU: whoever draws takes a [`FramePlan`] and reads its nodes.
+//! engine knows no GPU: whoever draws takes a [`FramePlan`] and reads its nodes. Decoding has threads of its
+//! own, so that it never stands in a queue before those who draw.
 
 mod board;
 mod clip;
@@ -20,6 +22,8 @@ mod error;
 mod event;
 mod inbox;
 mod loader;
+mod mailbox;
+mod notice;
 mod occlusion;
 mod piece;
 mod plan;
@@ -31,6 +35,7 @@ mod shared;
 mod simulated;
 mod stats;
 mod store;
+mod sync;
 mod traversal;
 mod tree;
 mod view;
@@ -63,6 +68,9 @@ use self::{
 };
 use crate::source::Source;
 
+/// Most threads that read local files.
+const FILE_THREADS: usize = 8;
+
 /// A running engine. Clouds may come and go, and settings change, while it runs: none of that waits, and
 /// the newest counts. Dropping it ends and joins its threads at once, requests or not.
 #[derive(Debug)]
@@ -78,9 +86,12 @@ impl Engine {
     /// [`EngineError::Thread`] where the system gives no thread.
     pub fn start(sources: Vec<Source>, config: EngineConfig) -> Result<Self, EngineError> {
         let shared = Arc::new(Shared::new(&config, sources));
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .max_blocking_threads(FILE_THREADS)
+            .build()?;
         let traversal = Traversal::new(Arc::clone(&shared), &config);
-        let loader = Loader::new(Arc::clone(&shared), config);
+        let loader = Loader::new(Arc::clone(&shared), config).with_decoders()?;
         // From here on, dropping the engine ends whatever threads it has.
         let mut engine = Self { shared, threads: Vec::new() };
         engine.spawn("traversal", || traversal.run())?;

@@ -32,7 +32,7 @@ impl Shared {
     pub fn new(config: &EngineConfig, sources: Vec<Source>) -> Self {
         let shared = Self {
             traversal: TraversalInbox::new(Settings::new(config)),
-            loader: LoaderInbox::default(),
+            loader: LoaderInbox::new(),
             board: Board::default(),
             counters: Counters::default(),
             clock: Mutex::new(Clock::new()),

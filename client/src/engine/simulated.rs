@@ -43,7 +43,7 @@ impl SimulatedEngine {
         let start = Instant::now();
         let shared = Arc::new(Shared::new(&config, sources));
         let traversal = Traversal::new(Arc::clone(&shared), &config);
-        let loader = Loader::new(Arc::clone(&shared), config).decoding_inline();
+        let loader = Loader::new(Arc::clone(&shared), config);
         runtime.spawn(loader.run());
         drop(entered);
         Ok(Self { shared, traversal, runtime, start, now: start })

@@ -7,7 +7,7 @@
 //! Node states and who knows them: unknown (nobody), queued, loading and failed-until (the loader),
 //! resident and lost (the store here), shown (in the plan).
 
-use std::{collections::HashSet, sync::Arc};
+use std::{collections::HashSet, sync::Arc, time::Instant};
 
 use lodestream_protocol::Boot;
 
@@ -130,10 +130,14 @@ impl Traversal {
             return;
         }
         reselect |= is_new;
+        let begin = Instant::now();
         if reselect {
             self.select();
         }
         self.publish(seen);
+        let counters = &self.shared.counters;
+        counters.plans.add(1);
+        counters.plan_nanos.add(u64::try_from(begin.elapsed().as_nanos()).unwrap_or(u64::MAX));
     }
 
     /// Takes in a picture; returns whether it is news.

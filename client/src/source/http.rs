@@ -5,35 +5,18 @@
 //! whole files again and again; its 200 is recognised from the head and the connection is closed
 //! without the body.
 
-use std::{
-    sync::{Arc, OnceLock},
-    time::Duration,
-};
+use std::sync::{Arc, OnceLock};
 
 use bytes::Bytes;
 use reqwest::{
-    Client, Response, StatusCode, Url,
+    Response, StatusCode, Url,
     header::{self, HeaderMap},
 };
 
-use super::{Announced, SourceError};
-
-/// How long a host may be silent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Timeouts {
-    /// Until a connection stands.
-    pub connect: Duration,
-    /// Until the head of an answer or the next part of its body arrives. There is no limit for a
-    /// whole answer: a slow link is no failure.
-    pub silence: Duration,
-}
-
-impl Default for Timeouts {
-    /// 10 s to connect, 15 s of silence.
-    fn default() -> Self {
-        Self { connect: Duration::from_secs(10), silence: Duration::from_secs(15) }
-    }
-}
+use super::{
+    Announced, SourceError,
+    connector::{Connections, Connector, Timeouts},
+};
 
 /// A dataset file at a URL. Clones share connections.
 #[derive(Debug, Clone)]
@@ -43,7 +26,7 @@ pub struct HttpSource {
 
 #[derive(Debug)]
 struct Inner {
-    client: Client,
+    connector: Arc<Connector>,
     url: Url,
     /// The URL without what may be secret.
     place: String,
@@ -79,40 +62,31 @@ struct ContentRange {
 
 impl HttpSource {
     /// A source at `url` with the default [`Timeouts`]. Nothing is asked yet.
-    ///
-    /// # Errors
-    /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
-    pub fn new(url: Url) -> Result<Self, SourceError> {
+    #[must_use]
+    pub fn new(url: Url) -> Self {
         Self::with_timeouts(url, Timeouts::default())
     }
 
     /// A source at `url`. Nothing is asked yet.
-    ///
-    /// # Errors
-    /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
-    pub fn with_timeouts(url: Url, timeouts: Timeouts) -> Result<Self, SourceError> {
-        // An error means that the process has chosen its provider already: just as good.
-        let _ = rustls::crypto::ring::default_provider().install_default();
+    #[must_use]
+    pub fn with_timeouts(url: Url, timeouts: Timeouts) -> Self {
+        let connector = Arc::new(Connector::new(timeouts, &url));
+        Self::through(connector, url)
+    }
+
+    fn through(connector: Arc<Connector>, url: Url) -> Self {
         let place = without_secrets(&url);
-        let mut builder = Client::builder()
-            .user_agent(concat!("lodestream/", env!("CARGO_PKG_VERSION")))
-            .tcp_nodelay(true)
-            .connect_timeout(timeouts.connect)
-            .read_timeout(timeouts.silence);
-        if is_loopback(&url) {
-            builder = builder.no_proxy();
-        }
-        let client = builder
-            .build()
-            .map_err(|e| SourceError::permanent(&place, format!("no HTTP client: {e}")))?;
-        Ok(Self { inner: Arc::new(Inner { client, url, place, identity: OnceLock::new() }) })
+        Self { inner: Arc::new(Inner { connector, url, place, identity: OnceLock::new() }) }
     }
 
     /// A source of whatever lies at the URL now. Shares connections.
     pub(super) fn renew(&self) -> Self {
-        let Inner { client, url, place, .. } = &*self.inner;
-        let (client, url, place) = (client.clone(), url.clone(), place.clone());
-        Self { inner: Arc::new(Inner { client, url, place, identity: OnceLock::new() }) }
+        Self::through(Arc::clone(&self.inner.connector), self.inner.url.clone())
+    }
+
+    /// The source, sharing connections with others.
+    pub(super) fn sharing(&self, connections: &Connections) -> Self {
+        Self::through(connections.shared(&self.inner.connector), self.inner.url.clone())
     }
 
     /// The URL, with whatever secrets it holds.
@@ -155,7 +129,8 @@ impl HttpSource {
 
     /// The whole of what lies there, at most so many bytes: for documents, not for datasets.
     pub(super) async fn read_document(&self, most: usize) -> Result<Vec<u8>, SourceError> {
-        let sent = self.inner.client.get(self.inner.url.clone()).send().await;
+        let client = self.inner.connector.client().map_err(|why| self.permanent(why))?;
+        let sent = client.get(self.inner.url.clone()).send().await;
         let mut response = sent.map_err(|e| self.classify(&e))?;
         let status = response.status();
         if !status.is_success() {
@@ -176,9 +151,8 @@ impl HttpSource {
         let Some(last) = ask.len.checked_sub(1).and_then(|n| ask.offset.checked_add(n)) else {
             return Err(self.permanent(format!("{} bytes at {} are no range", ask.len, ask.offset)));
         };
-        let response = self
-            .inner
-            .client
+        let client = self.inner.connector.client().map_err(|why| self.permanent(why))?;
+        let response = client
             .get(self.inner.url.clone())
             .header(header::RANGE, format!("bytes={}-{last}", ask.offset))
             .send()
@@ -362,11 +336,6 @@ fn innermost(error: &reqwest::Error) -> String {
     cause.to_string()
 }
 
-fn is_loopback(url: &Url) -> bool {
-    let host = url.host_str().unwrap_or_default().trim_matches(['[', ']']);
-    host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback())
-}
-
 fn without_secrets(url: &Url) -> String {
     let mut shown = url.clone();
     shown.set_query(None);
@@ -402,7 +371,7 @@ mod tests {
     #[test]
     fn secrets_in_a_url_are_not_shown() {
         let url = Url::parse("https://me:pw@a.example/b.lods?signature=x").expect("a URL");
-        let source = HttpSource::new(url).expect("a client");
+        let source = HttpSource::new(url);
         assert_eq!(source.describe(), "https://a.example/b.lods");
     }
 }

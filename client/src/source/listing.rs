@@ -43,7 +43,7 @@ pub fn list_datasets(server: &str) -> Result<DatasetIndex, SourceError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|e| SourceError::transient(&place, format!("no thread: {e}")))?;
     // The client that datasets are read by.
-    let source = HttpSource::new(url)?;
+    let source = HttpSource::new(url);
     let bytes = runtime.block_on(source.read_document(MAX_BYTES))?;
     serde_json::from_slice(&bytes).map_err(|e| {
         let why = format!("its answer is no list of datasets ({e}); name a dataset on it instead");

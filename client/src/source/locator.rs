@@ -19,7 +19,7 @@ pub fn parse(text: &str) -> Result<Source, SourceError> {
     } else {
         return Err(SourceError::permanent(text, format!("no such file; {ACCEPTED}")));
     };
-    HttpSource::new(url).map(Source::Http)
+    Ok(Source::Http(HttpSource::new(url)))
 }
 
 /// Whether `text` reads `host:port` or `host:port/…`.

@@ -8,6 +8,7 @@
 
 mod backoff;
 mod blocking;
+mod connector;
 mod error;
 mod file;
 mod http;
@@ -22,9 +23,11 @@ use bytes::{Bytes, BytesMut};
 
 pub use backoff::Backoff;
 pub use blocking::BlockingSource;
+pub(crate) use connector::Connections;
+pub use connector::Timeouts;
 pub use error::SourceError;
 pub use file::FileSource;
-pub use http::{HttpSource, Timeouts};
+pub use http::HttpSource;
 pub use link::{Link, LinkSpec};
 pub use linked::LinkedSource;
 pub use listing::{datasets_of_folder, is_server, list_datasets};
@@ -89,6 +92,22 @@ impl Source {
             Self::Http(source) => source.describe(),
             Self::File(source) => source.describe(),
             Self::Linked(source) => source.describe(),
+        }
+    }
+
+    /// The source, sharing connections with all others that are used in the same runtime.
+    pub(crate) fn sharing(self, connections: &Connections) -> Self {
+        match self {
+            Self::Http(source) => Self::Http(source.sharing(connections)),
+            Self::File(_) | Self::Linked(_) => self,
+        }
+    }
+
+    /// The host that is asked; `None` for files.
+    pub(crate) fn host(&self) -> Option<&str> {
+        match self {
+            Self::Http(source) => Some(source.url().authority()),
+            Self::File(_) | Self::Linked(_) => None,
         }
     }
 

@@ -24,6 +24,9 @@ pub const FOV_Y: f64 = 50.0 * PI / 180.0;
 /// Nearer to straight up or down than this, z is no help to tell what is up.
 const POLE: f64 = FRAC_PI_2 - 1e-3;
 
+/// Part of the picture that what is framed may fill.
+const FILLED: f64 = 0.96;
+
 /// A turn of the wheel.
 const WHEEL_STEP: f64 = 1.25;
 
@@ -299,12 +302,17 @@ impl Navigator {
         goal.pivot = 0.5 * (min + max);
         let (right, up, forward) = (goal.right(), goal.up(), goal.forward());
         let half = 0.5 * (max - min);
-        let reach = |axis: DVec3| half.dot(axis.abs());
-        let tangent = (0.5 * goal.fov_y).tan();
-        let across = (reach(up)).max(reach(right) / aspect.max(1e-3));
-        let depth = if goal.orthographic { 0.0 } else { reach(forward) };
+        let tangent = FILLED * (0.5 * goal.fov_y).tan();
+        // Each corner is inside the picture from that distance on.
+        let needed = (0..8).map(|corner| {
+            let sign = |axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+            let at = half * DVec3::new(sign(0), sign(1), sign(2));
+            let across = at.dot(up).abs().max(at.dot(right).abs() / aspect.max(1e-3));
+            let depth = if goal.orthographic { 0.0 } else { at.dot(forward) };
+            across / tangent - depth
+        });
         let least = 1e-6 * (1.0 + goal.pivot.abs().max_element());
-        goal.distance = (1.04 * across / tangent + depth).max(least);
+        goal.distance = needed.fold(least, f64::max);
         self.is_chosen = true;
     }
 

@@ -304,8 +304,7 @@ fn a_file_that_is_replaced_under_its_name_is_opened_anew() {
     // In place, too.
     std::fs::write(&path, &old).expect("overwritten");
     engine.set_cache_bytes(0);
-    engine.set_view(away(view()));
-    engine.set_view(view());
+    settle_afresh(&engine, view());
     wait_for(&engine, |clouds| clouds[0].replaced == 2);
     settle(&engine);
 }
@@ -359,8 +358,7 @@ fn hosts_without_entity_tags_are_known_by_dates() {
     host.behave(|_| Answer::Dated("Mon, 01 Jan 2024 00:00:00 GMT"));
     let config = EngineConfig { speculative_bytes: 0, ..config() };
     let expected = expected(&new, &config, view());
-    let source =
-        Source::Http(HttpSource::new(host.url().parse().expect("a URL")).expect("a client"));
+    let source = Source::Http(HttpSource::new(host.url().parse().expect("a URL")));
     let engine = Engine::start(vec![source], config).expect("starts");
     engine.wait_open(LONG).expect("opens");
     host.replace(new);

@@ -18,8 +18,12 @@ use crate::{
 /// Pictures of the same nodes by the same renderer differ by nothing but rounding.
 const SAME: f64 = 0.98;
 
+/// Fewer points than there are.
+const BUDGET: &str = "400000";
+
 /// The splats of the pictures that are compared.
-const LOOK: [&str; 6] = ["--splat", "circle", "--splat-size", "3px", "--theme", "dark"];
+const LOOK: [&str; 8] =
+    ["--splat", "circle", "--splat-size", "adaptive:1.6", "--min-splat", "2", "--max-splat", "8"];
 
 fn eye(event: &Value) -> [f64; 3] {
     place(&event["camera"]["eye"])
@@ -76,22 +80,22 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     if is_without_gpu() {
         return;
     }
-    let mut world = World::of("sim:courtyard?points=400k&seed=3");
+    let mut world = World::of("sim:courtyard?points=1M&seed=3");
     let source = world.source();
     let folder = world.file("out");
     let screen = Screen::new(1280, 800);
     let photographs = screenshots();
     let photograph = |name: &str| screen.write(&photographs.join(name));
     let mut arguments = vec![source.as_str(), "--folder", &folder, "--settings", "-"];
-    arguments.extend(["--size", "1280x800", "--budget", "150000", "--min-node", "40"]);
+    arguments.extend(["--size", "1280x800", "--budget", BUDGET, "--theme", "dark"]);
     arguments.extend(LOOK);
     let mut window = Window::open(&screen, PROGRAM, &arguments);
 
     // Opens, and shows what `shot` draws.
     let opened = window.wait("opened", |event| event["cloud"] == 0);
-    assert_eq!(opened["points"], 400_000);
+    assert_eq!(opened["points"], 1_000_000);
     let first = window.settled();
-    let look = ["--splat", "circle", "--splat-size", "3px", "--budget", "150000"];
+    let look = [&LOOK[..], &["--budget", BUDGET]].concat();
     let picture = window.picture();
     compare(&world, &picture, &look);
     photograph("overview.png");
@@ -172,7 +176,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     window.settled();
     let picture = window.picture();
     let other =
-        ["--splat", "square", "--splat-size", "3px", "--color", "elevation", "--budget", "150000"];
+        [&LOOK[2..], &["--splat", "square", "--color", "elevation", "--budget", BUDGET]].concat();
     compare(&world, &picture, &other);
     photograph("elevation.png");
 

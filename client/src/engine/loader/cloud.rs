@@ -1,6 +1,6 @@
 //! What the loader knows of a cloud.
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use bytes::Bytes;
 use lodestream_protocol::Boot;
@@ -8,7 +8,7 @@ use tokio::time::Instant;
 
 use crate::source::Source;
 
-use super::{flight::Delivered, pace::Pace};
+use super::{super::piece::PieceId, flight::Delivered, pace::Pace};
 
 /// One version of a cloud.
 #[derive(Debug)]
@@ -20,6 +20,8 @@ pub struct Cloud {
     /// The first bytes of the file, and how many of them will come in all.
     pub prefix: Bytes,
     pub prefix_end: u64,
+    /// Pieces that were taken from it, ever.
+    pub prefix_used: HashSet<PieceId>,
     /// Bytes of payloads and pages that have come.
     pub delivered: Arc<Delivered>,
     pub pace: Pace,
@@ -45,6 +47,7 @@ impl Cloud {
             boot: None,
             prefix: Bytes::new(),
             prefix_end: 0,
+            prefix_used: HashSet::new(),
             delivered: Arc::default(),
             pace: Pace::default(),
             failures: 0,

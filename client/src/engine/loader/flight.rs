@@ -107,6 +107,11 @@ impl Flight {
         self.len.saturating_sub(self.progress.bytes.load(Ordering::Relaxed))
     }
 
+    /// Bytes between its pieces.
+    pub fn gap_bytes(&self) -> u64 {
+        self.len.saturating_sub(self.pieces.iter().map(|piece| piece.len).sum())
+    }
+
     /// How long the first byte took; and since then, what the host delivered for all requests, of
     /// `delivered` ever, in what time. `None` where nothing has come.
     pub fn measured(&self, delivered: u64) -> Option<(Duration, u64, Duration)> {

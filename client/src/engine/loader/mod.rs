@@ -1,7 +1,7 @@
 //! The loader thread: turns demands into requests, and answers into events.
 //!
-//! Owned by the engine; owns an async runtime of one thread, which all requests run on; decoding
-//! goes to the rayon pool. A demand replaces the one before: what is no longer wanted is forgotten
+//! Owned by the engine; owns an async runtime of one thread, which all requests run on, and the threads that
+//! decode. A demand replaces the one before: what is no longer wanted is forgotten
 //! if it was queued, and broken off if it was in flight and not nearly done. Failures of a host
 //! pause that host, failures of a piece pause that piece; neither ends anything. What ends a cloud ends
 //! that cloud alone, until it can be opened again (`openings.rs`).
@@ -24,12 +24,15 @@ use std::{
 use bytes::Bytes;
 use lodestream_protocol::Error;
 use tokio::{
-    sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel},
+    sync::{
+        Semaphore,
+        mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel},
+    },
     // Its clock can be a simulated one.
     time::Instant,
 };
 
-use crate::source::{Backoff, Source, SourceError};
+use crate::source::{Backoff, Connections, Source, SourceError};
 
 use self::{
     cloud::Cloud,
@@ -100,14 +103,20 @@ pub(super) struct Loader {
     openings: HashMap<OpeningId, OpeningTask>,
     next_opening: OpeningId,
     demand: Vec<Piece>,
+    /// The pieces of the demand.
+    wanted: HashSet<PieceId>,
     /// When each wanted piece was first wanted, where pieces are loaded in that order.
     turns: HashMap<PieceId, u64>,
     next_turn: u64,
     pieces: Pieces,
     flights: HashMap<FlightId, Flight>,
     next_flight: FlightId,
-    /// Decode at once, on this thread: simulated time must not pass meanwhile.
-    decode_inline: bool,
+    /// Where decoding goes; where there are none, it is done at once, on this thread: simulated time must not
+    /// pass meanwhile.
+    decoders: Option<rayon::ThreadPool>,
+    connections: Connections,
+    /// Who asks a host for first bytes passes its gate; `None` is for files.
+    gates: HashMap<Option<String>, Arc<Semaphore>>,
     sender: UnboundedSender<Message>,
     receiver: UnboundedReceiver<Message>,
 }
@@ -122,20 +131,33 @@ impl Loader {
             openings: HashMap::new(),
             next_opening: 0,
             demand: Vec::new(),
+            wanted: HashSet::new(),
             turns: HashMap::new(),
             next_turn: 0,
             pieces: Pieces::default(),
             flights: HashMap::new(),
             next_flight: 0,
-            decode_inline: false,
+            decoders: None,
+            connections: Connections::default(),
+            gates: HashMap::new(),
             sender,
             receiver,
         }
     }
 
-    /// The same, decoding on its own thread.
-    pub fn decoding_inline(self) -> Self {
-        Self { decode_inline: true, ..self }
+    /// The same, with threads that decode: not those that a renderer may use, behind whose backs what it
+    /// asks for would wait for all that has come. One processor is left for who draws.
+    ///
+    /// # Errors
+    /// Where the system gives no thread.
+    pub fn with_decoders(self) -> std::io::Result<Self> {
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let decoders = rayon::ThreadPoolBuilder::new()
+            .num_threads(processors.saturating_sub(1).max(1))
+            .thread_name(|index| format!("decoder {index}"))
+            .build()
+            .map_err(std::io::Error::other)?;
+        Ok(Self { decoders: Some(decoders), ..self })
     }
 
     /// Runs until the inbox says to end.
@@ -171,15 +193,15 @@ impl Loader {
         self.demand = demand.pieces;
         // It may have been written before the traversal knew that a cloud is gone.
         self.demand.retain(|piece| self.clouds.contains_key(&piece.id.node.cloud));
-        let wanted: HashSet<_> = self.demand.iter().map(|piece| piece.id).collect();
-        self.pieces.update(&wanted, demand.seen);
+        self.wanted = self.demand.iter().map(|piece| piece.id).collect();
+        self.pieces.update(&self.wanted, demand.seen);
         if self.config.order == LoadOrder::Arrival {
-            self.take_turns(&wanted);
+            self.take_turns();
         }
         if !self.config.cancels {
             return;
         }
-        let pieces = &self.pieces;
+        let (pieces, wanted) = (&self.pieces, &self.wanted);
         let stale = self.flights.extract_if(|id, flight| {
             let mut open = flight.pieces.iter().filter(|piece| pieces.is_loading(piece.id, *id));
             !open.any(|piece| wanted.contains(&piece.id)) && !flight.is_nearly_done()
@@ -192,8 +214,8 @@ impl Loader {
     }
 
     /// Puts the demand into the order in which its pieces were first wanted.
-    fn take_turns(&mut self, wanted: &HashSet<PieceId>) {
-        self.turns.retain(|id, _| wanted.contains(id));
+    fn take_turns(&mut self) {
+        self.turns.retain(|id, _| self.wanted.contains(id));
         for piece in &self.demand {
             self.turns.entry(piece.id).or_insert_with(|| {
                 self.next_turn += 1;
@@ -221,6 +243,9 @@ impl Loader {
                 let Some(flight_) = self.flights.get(&flight) else { return };
                 let piece = flight_.pieces[index].clone();
                 if self.pieces.is_loading(piece.id, flight) {
+                    if self.wanted.contains(&piece.id) {
+                        self.shared.counters.useful_bytes.add(piece.len);
+                    }
                     self.start_decoding(piece, bytes);
                 }
             }
@@ -247,10 +272,9 @@ impl Loader {
             shared.counters.decode_nanos.add(nanos);
             let _ = sender.send(Message::Decoded { piece: piece.id, result });
         };
-        if self.decode_inline {
-            work();
-        } else {
-            rayon::spawn(work);
+        match &self.decoders {
+            Some(decoders) => decoders.spawn(work),
+            None => work(),
         }
     }
 
@@ -298,6 +322,7 @@ impl Loader {
         let error = match result {
             Ok(()) => {
                 let delivered = cloud.delivered.bytes.load(Ordering::Relaxed);
+                self.shared.counters.gap_bytes.add(flight.gap_bytes());
                 if let Some((wait, bytes, time)) = flight.measured(delivered) {
                     cloud.pace.note(wait, bytes, time);
                 }
@@ -373,6 +398,10 @@ impl Loader {
             }
         }
         for (piece, bytes) in found {
+            let cloud = self.clouds.get_mut(&piece.id.node.cloud);
+            if cloud.is_some_and(|cloud| cloud.prefix_used.insert(piece.id)) {
+                self.shared.counters.useful_bytes.add(piece.len);
+            }
             self.start_decoding(piece, bytes);
         }
     }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use bytes::{Bytes, BytesMut};
 use lodestream_protocol::{Boot, Error, HEADER_BYTES, Header};
+use tokio::sync::Semaphore;
 
 use crate::source::{Announced, Backoff, Source, SourceError};
 
@@ -23,26 +24,39 @@ pub struct Opening {
     pub expected: u64,
 }
 
-/// Opens `source`, trying again for as long as that may help; asks for `speculative` bytes at first.
-/// Whenever more of them has come, it is told, and which source they are of: where the file is replaced
-/// meanwhile, that is another one. `number` is the cloud's for the caller.
+/// How a cloud is opened.
+#[derive(Debug)]
+pub struct Ask<'a> {
+    /// The cloud's, for the caller.
+    pub number: usize,
+    /// Bytes that are asked for at first.
+    pub speculative: u64,
+    /// To be passed before the host is asked.
+    pub gate: &'a Semaphore,
+}
+
+/// Opens `source`, trying again for as long as that may help. Whenever more of the first bytes has come,
+/// it is told, and which source they are of: where the file is replaced meanwhile, that is another one.
 ///
 /// # Errors
 /// What is wrong for good, with the source's name.
 pub async fn open(
     shared: &Shared,
-    number: usize,
+    ask: Ask<'_>,
     mut source: Source,
-    speculative: u64,
     tell: impl Fn(&Source, Opening) + Send + Sync,
 ) -> Result<(), String> {
     let mut failures = 0;
     loop {
         let mut reader = Reader { boot: None, bytes: BytesMut::new(), announced: None };
         let told = |opening| tell(&source, opening);
-        let error = match reader.read(shared, &source, speculative, &told).await {
+        // Closed never; and who waits for another try keeps nobody from his first.
+        let passed = ask.gate.acquire().await;
+        let result = reader.read(shared, &source, ask.speculative, &told).await;
+        drop(passed);
+        let error = match result {
             Ok(()) => {
-                shared.trouble(Some(number), None);
+                shared.trouble(Some(ask.number), None);
                 return Ok(());
             }
             Err(Failure::Format(error)) => return Err(format!("{}: {error}", source.describe())),
@@ -57,7 +71,7 @@ pub async fn open(
         }
         failures += 1;
         shared.counters.retries.add(1);
-        shared.trouble(Some(number), Some(error.to_string()));
+        shared.trouble(Some(ask.number), Some(error.to_string()));
         tokio::time::sleep(Backoff::default().delay(failures)).await;
     }
 }

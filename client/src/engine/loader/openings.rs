@@ -7,13 +7,14 @@
 
 use std::{sync::Arc, time::Duration};
 
-use tokio::task::AbortHandle;
+use bytes::Bytes;
+use tokio::{sync::Semaphore, task::AbortHandle};
 
 use super::{
     super::{event::Event, inbox::Change},
     Loader, Message,
     cloud::Cloud,
-    open::{self, Opening},
+    open::{self, Ask, Opening},
 };
 use crate::source::{Backoff, Source, SourceError};
 
@@ -22,6 +23,13 @@ pub type OpeningId = u64;
 
 /// A cloud that was open and has failed is tried again in such steps.
 const PATIENCE: Backoff = Backoff { first: Duration::from_secs(4), most: Duration::from_secs(60) };
+
+/// Clouds of one host that are opened at a time. More would share its link, and what matters most would come
+/// later.
+const OPENINGS_PER_HOST: usize = 6;
+
+/// Most first bytes that are kept of all clouds together, for nodes that are wanted again.
+const MAX_PREFIX_BYTES: u64 = 32 << 20;
 
 /// A task that opens a cloud.
 #[derive(Debug)]
@@ -35,6 +43,7 @@ impl Loader {
     pub(super) fn change(&mut self, change: Change) {
         match change {
             Change::Add { cloud, number, source } => {
+                let source = source.sharing(&self.connections);
                 self.clouds.insert(cloud, Cloud::new(number, source));
                 self.start_opening(cloud, false, Duration::ZERO);
             }
@@ -109,6 +118,9 @@ impl Loader {
         let id = self.next_opening;
         self.next_opening += 1;
         let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
+        let gate = self.gates.entry(source.host().map(str::to_owned));
+        let gate = gate.or_insert_with(|| Arc::new(Semaphore::new(OPENINGS_PER_HOST)));
+        let gate = Arc::clone(gate);
         let speculative = self.config.speculative_bytes;
         let task = tokio::spawn(async move {
             // The loader outlives its tasks, save when it shuts down.
@@ -123,7 +135,10 @@ impl Loader {
             loop {
                 let source = if again { source.renew() } else { Ok(source.clone()) };
                 let result = match source {
-                    Ok(source) => open::open(&shared, number, source, speculative, &tell).await,
+                    Ok(source) => {
+                        let ask = Ask { number, speculative, gate: &gate };
+                        open::open(&shared, ask, source, &tell).await
+                    }
                     Err(error) => Err(error.to_string()),
                 };
                 let Err(message) = result else { break };
@@ -163,6 +178,7 @@ impl Loader {
         let boot = &opening.boot;
         let cloud = match &known.boot {
             None => {
+                self.shared.counters.useful_bytes.add(boot.header.index_bytes());
                 self.shared.traversal.post(Event::Opened { cloud, boot: Arc::clone(boot) });
                 cloud
             }
@@ -180,6 +196,22 @@ impl Loader {
         known.source = source;
         known.prefix = opening.prefix;
         known.prefix_end = opening.expected;
+        self.drop_prefixes(cloud);
+    }
+
+    /// Drops first bytes where there are too many, the oldest first, but for those that are coming.
+    fn drop_prefixes(&mut self, newest: usize) {
+        let mut bytes: u64 = self.clouds.values().map(|cloud| cloud.prefix.len() as u64).sum();
+        for (&index, cloud) in &mut self.clouds {
+            if bytes <= MAX_PREFIX_BYTES {
+                return;
+            }
+            if index != newest && cloud.prefix_left() == 0 {
+                bytes -= cloud.prefix.len() as u64;
+                cloud.prefix = Bytes::new();
+                cloud.prefix_end = 0;
+            }
+        }
     }
 
     /// Puts the dataset that is there now into the place of a cloud; returns its index.
@@ -192,6 +224,7 @@ impl Loader {
             opening.cloud = by;
         }
         self.drop_cloud(cloud);
+        self.shared.counters.useful_bytes.add(opening.boot.header.index_bytes());
         let boot = Arc::clone(&opening.boot);
         self.shared.traversal.post(Event::Replaced { cloud, by, boot });
         by
