@@ -47,7 +47,13 @@ pub(crate) fn draw<R: ReadAt + Sync>(
         for (node, points) in batch.iter().zip(decoded) {
             done(points.positions.len() as u64)?;
             let (key, spacing) = (node.key, node.spacing);
-            renderer.add_node(DrawNode { cloud, key, spacing, points: Arc::new(points) })?;
+            renderer.add_node(DrawNode {
+                cloud,
+                key,
+                spacing,
+                points: Arc::new(points),
+                part: 0,
+            })?;
         }
     }
     Ok(())

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use lodestream_client::{
-    commands::{demo, eval, export, shot, stability},
+    commands::{demo, eval, export, shot, stability, view},
     source::{BlockingSource, Source},
 };
 use lodestream_server::commands::{build, finish, inspect, serve, verify};
@@ -28,6 +28,7 @@ enum Command {
     Demo(demo::DemoArgs),
     Eval(eval::EvalArgs),
     Stability(stability::StabilityArgs),
+    View(view::ViewArgs),
 }
 
 fn main() -> ExitCode {
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Stability(args) => stability::run(args),
+        Command::View(args) => view::run(args),
     })
 }
 

@@ -140,6 +140,28 @@ impl<R: ReadAt> Dataset<R> {
         Ok(nodes)
     }
 
+    /// The node of a key, by way of the pages that lead to it; `None` where there is no such node.
+    ///
+    /// # Errors
+    /// As for [`Boot::parse`].
+    pub fn node(&self, key: NodeKey) -> Result<Option<Node>> {
+        let mut nodes = self.boot.root_page.nodes.clone();
+        for level in 0..=key.level() {
+            let Some(ancestor) = key.ancestor(level) else { return Ok(None) };
+            let Some(place) = nodes.iter().position(|node| node.key == ancestor) else {
+                return Ok(None);
+            };
+            if level == key.level() {
+                return Ok(Some(nodes.swap_remove(place)));
+            }
+            if let Some(page) = nodes[place].child_page {
+                let bytes = self.source.read_at(page.offset, page.bytes as usize)?;
+                nodes = self.boot.parse_child_page(&bytes, &nodes[place])?.nodes;
+            }
+        }
+        Ok(None)
+    }
+
     /// Reads and decodes a node to the last bit: positions always, and the given further groups.
     ///
     /// # Errors

@@ -215,7 +215,7 @@ impl Studio {
             for node in &nodes {
                 let points = Arc::new(dataset.read_node(node, &groups)?);
                 let (key, spacing) = (node.key, node.spacing);
-                renderer.add_node(DrawNode { cloud: 0, key, spacing, points })?;
+                renderer.add_node(DrawNode { cloud: 0, key, spacing, points, part: 0 })?;
             }
         }
         Ok(renderer.finish()?.picture)

@@ -214,7 +214,7 @@ impl Kept {
                 let manifest = &*frame.clouds[cloud];
                 let of = datasets.iter_mut().find(|dataset| dataset.dataset.manifest() == manifest);
                 let points = of.ok_or("a dataset that is not known")?.points(key)?;
-                nodes.push(DrawNode { cloud, key, spacing, points });
+                nodes.push(DrawNode { cloud, key, spacing, points, part: 0 });
             }
             let scene = Scene { clouds: &frame.clouds, nodes: &nodes };
             let begin = Instant::now();

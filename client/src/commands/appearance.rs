@@ -49,12 +49,12 @@ pub struct Appearance {
     pub gpu_path: GpuPath,
 }
 
-fn splats() -> impl TypedValueParser<Value = Splat> {
+pub(super) fn splats() -> impl TypedValueParser<Value = Splat> {
     let names = Splat::ALL.map(|(_, name)| name);
     PossibleValuesParser::new(names).try_map(|name| name.parse::<Splat>())
 }
 
-fn colors() -> impl TypedValueParser<Value = ColorMode> {
+pub(super) fn colors() -> impl TypedValueParser<Value = ColorMode> {
     let names = ColorMode::ALL.map(ColorMode::name);
     PossibleValuesParser::new(names).try_map(|name| name.parse::<ColorMode>())
 }

@@ -6,3 +6,4 @@ pub mod eval;
 pub mod export;
 pub mod shot;
 pub mod stability;
+pub mod view;

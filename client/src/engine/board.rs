@@ -1,6 +1,9 @@
 //! What the engine shows to the outside: the newest plan and how the clouds are.
 
-use std::sync::Arc;
+use std::{
+    sync::{Arc, OnceLock},
+    time::Duration,
+};
 
 use lodestream_protocol::Boot;
 
@@ -57,5 +60,45 @@ impl News {
     }
 }
 
-/// The board.
-pub(super) type Board = Notice<News>;
+/// What is called when there is news.
+struct Waker(Box<dyn Fn() + Send + Sync>);
+
+impl std::fmt::Debug for Waker {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str("Waker")
+    }
+}
+
+/// The board, and who is woken by it without waiting for it.
+#[derive(Debug, Default)]
+pub(super) struct Board {
+    notice: Notice<News>,
+    waker: OnceLock<Waker>,
+}
+
+impl Board {
+    /// Looks at the news.
+    pub fn read<T>(&self, look: impl FnOnce(&News) -> T) -> T {
+        self.notice.read(look)
+    }
+
+    /// Changes the news and wakes those who wait.
+    pub fn post<T>(&self, change: impl FnOnce(&mut News) -> T) -> T {
+        let result = self.notice.post(change);
+        if let Some(Waker(wake)) = self.waker.get() {
+            wake();
+        }
+        result
+    }
+
+    /// Calls `wake` after every change from now on, on the thread that made it. The first one stays.
+    pub fn wake_by(&self, wake: impl Fn() + Send + Sync + 'static) {
+        // A second one would be a mistake of the one caller there is.
+        let _ = self.waker.set(Waker(Box::new(wake)));
+    }
+
+    /// Waits until `look` finds what it looks for; `None` where the time runs out.
+    pub fn wait<T>(&self, timeout: Duration, look: impl FnMut(&News) -> Option<T>) -> Option<T> {
+        self.notice.wait(timeout, look)
+    }
+}

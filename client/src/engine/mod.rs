@@ -208,6 +208,13 @@ impl Engine {
         self.shared.set(|settings| settings.cache_bytes = cache_bytes)
     }
 
+    /// Has `wake` called whenever there is a newer plan or a cloud is another: for callers that sleep where
+    /// this engine cannot wake them. It is called on the engine's threads (and the caller's own), and must
+    /// not wait. Of several, the first counts.
+    pub fn on_news(&self, wake: impl Fn() + Send + Sync + 'static) {
+        self.shared.board.wake_by(wake);
+    }
+
     /// The newest plan. Never waits.
     #[must_use]
     pub fn plan(&self) -> Arc<FramePlan> {

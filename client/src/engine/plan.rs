@@ -19,6 +19,9 @@ pub struct DrawNode {
     /// Its elements: positions, and the columns that have arrived. Columns of further groups may
     /// still be missing while [`FramePlan::settled`] is false.
     pub points: Arc<NodePoints>,
+    /// 0 where these are all elements of the node, as in every plan. Whoever draws a part of them gives
+    /// each part of a node another number: renderers know by it what they have.
+    pub part: u64,
 }
 
 /// Nodes and their points.

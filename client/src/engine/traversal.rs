@@ -348,6 +348,7 @@ impl Traversal {
                     key: pick.id.key,
                     spacing: pick.node.spacing,
                     points: Arc::clone(points),
+                    part: 0,
                 });
             }
         }

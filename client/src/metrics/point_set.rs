@@ -30,7 +30,7 @@ impl PointSet {
     /// No points yet.
     #[must_use]
     pub fn new(cloud: &Arc<Manifest>) -> Self {
-        let around = Surroundings::of(std::slice::from_ref(cloud), ColorMode::Rgb);
+        let around = Surroundings::of(std::slice::from_ref(cloud), |_| ColorMode::Rgb);
         // Without colours, clouds are painted by something else, which is no error of theirs.
         let painted =
             matches!(around.colorings[..], [Coloring::Rgb { .. } | Coloring::Constant(_)]);

@@ -31,12 +31,12 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 pub use color::Coloring;
-pub use cpu::{CpuRenderer, TruthRenderer};
+pub use cpu::{CpuRenderer, Seen, TruthRenderer};
 pub use density::PointsPerPixel;
 pub use gpu::{GpuConfig, GpuPath, GpuRenderer, shader_bytes};
 pub use picture::Picture;
 pub use renderer::Renderer;
-pub use scene::Scene;
+pub use scene::{CloudColors, Scene};
 pub use settings::{
     ColorMode, EyeDome, LARGEST_SIDE_PX, LARGEST_SPLAT_PX, RenderSettings, SMALLEST_SPLAT_PX,
     Shading, SizeLimits, Splat, SplatSize,

@@ -7,7 +7,7 @@ use lodestream_protocol::{Manifest, NodeKey};
 
 use crate::{
     engine::DrawNode,
-    render::{Coloring, RenderError, VisibleTree, settings::ColorMode},
+    render::{Coloring, RenderError, RenderSettings, VisibleTree, settings::ColorMode},
 };
 
 /// Where two points of the same pixel have the same depth, the one that comes first in this order
@@ -48,6 +48,25 @@ impl<'a> Scene<'a> {
     }
 }
 
+/// Where the colours of each cloud come from, where that is not where [`RenderSettings::color`] says.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CloudColors<'a>(pub &'a [Option<ColorMode>]);
+
+impl CloudColors<'_> {
+    /// Of cloud `cloud`. A heat map counts the points of all clouds.
+    #[must_use]
+    pub fn mode(&self, cloud: usize, settings: &RenderSettings) -> ColorMode {
+        let own = self.0.get(cloud).copied().flatten();
+        own.filter(|_| settings.color != ColorMode::Density).unwrap_or(settings.color)
+    }
+
+    /// What the picture is to look like where it shows cloud `cloud`.
+    #[must_use]
+    pub fn settings(&self, cloud: usize, settings: &RenderSettings) -> RenderSettings {
+        RenderSettings { color: self.mode(cloud, settings), ..*settings }
+    }
+}
+
 /// What the colours and depths of a picture need to know about all clouds together.
 #[derive(Debug, Clone)]
 pub(crate) struct Surroundings {
@@ -60,11 +79,16 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
-    pub fn of(clouds: &[Arc<Manifest>], mode: ColorMode) -> Self {
+    /// Of clouds, each coloured in its mode.
+    pub fn of(clouds: &[Arc<Manifest>], mode: impl Fn(usize) -> ColorMode) -> Self {
         let corners = clouds.iter().filter_map(|cloud| cloud.bounds_world());
         let corners = corners.map(|(min, max)| (DVec3::from(min), DVec3::from(max)));
         Self {
-            colorings: clouds.iter().map(|cloud| Coloring::of(mode, cloud)).collect(),
+            colorings: clouds
+                .iter()
+                .enumerate()
+                .map(|(i, cloud)| Coloring::of(mode(i), cloud))
+                .collect(),
             bounds: corners.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
             levels: clouds.iter().map(|cloud| cloud.levels).max().unwrap_or(0),
         }

@@ -49,6 +49,18 @@ pub struct TestScene {
     pub nodes: Vec<DrawNode>,
 }
 
+/// A cloud of one node of 256 steps a side, far from the origin, with colours and intensities.
+pub fn small_cube(points: &[[u32; 3]]) -> TestScene {
+    let offset = [500_000.25, 5_000_000.5, 100.0];
+    let lattice = Lattice { scale: 0.01, offset, origin: [0; 3], side_bits: 8 };
+    let points: Vec<Point> = points
+        .iter()
+        .enumerate()
+        .map(|(index, q)| Point { q: *q, rgb: [index as u8; 3], intensity: index as u16 })
+        .collect();
+    cloud(lattice, 1, &points)
+}
+
 impl TestScene {
     pub fn scene(&self) -> Scene<'_> {
         Scene { clouds: &self.clouds, nodes: &self.nodes }
@@ -138,6 +150,7 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
             key,
             spacing: manifest.spacing_world(key.level()) as f32,
             points: Arc::new(node),
+            part: 0,
         }
     });
     TestScene { nodes: nodes.collect(), clouds: vec![Arc::new(manifest)] }

@@ -127,6 +127,25 @@ impl HttpSource {
         total.ok_or_else(|| self.permanent("the host does not tell the length of the file"))
     }
 
+    /// The whole of what lies there, at most so many bytes: for documents, not for datasets.
+    pub(super) async fn read_document(&self, most: usize) -> Result<Vec<u8>, SourceError> {
+        let client = self.inner.connector.client().map_err(|why| self.permanent(why))?;
+        let sent = client.get(self.inner.url.clone()).send().await;
+        let mut response = sent.map_err(|e| self.classify(&e))?;
+        let status = response.status();
+        if !status.is_success() {
+            return Err(self.transient(format!("the host answered {status}")));
+        }
+        let mut bytes = Vec::new();
+        while let Some(piece) = response.chunk().await.map_err(|e| self.classify(&e))? {
+            if bytes.len() + piece.len() > most {
+                return Err(self.permanent(format!("longer than {most} bytes")));
+            }
+            bytes.extend_from_slice(&piece);
+        }
+        Ok(bytes)
+    }
+
     /// Sends the request and checks the head of the answer.
     async fn ask(&self, ask: Ask) -> Result<(Response, ContentRange), SourceError> {
         let Some(last) = ask.len.checked_sub(1).and_then(|n| ask.offset.checked_add(n)) else {

@@ -23,7 +23,7 @@ pub fn parse(text: &str) -> Result<Source, SourceError> {
 }
 
 /// Whether `text` reads `host:port` or `host:port/…`.
-fn is_server_address(text: &str) -> bool {
+pub(super) fn is_server_address(text: &str) -> bool {
     let authority = text.split('/').next().unwrap_or(text);
     let Some((host, port)) = authority.rsplit_once(':') else { return false };
     // A single letter is a Windows drive.

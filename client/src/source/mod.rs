@@ -14,6 +14,7 @@ mod file;
 mod http;
 mod link;
 mod linked;
+mod listing;
 mod locator;
 
 use std::sync::Arc;
@@ -29,6 +30,7 @@ pub use file::FileSource;
 pub use http::HttpSource;
 pub use link::{Link, LinkSpec};
 pub use linked::LinkedSource;
+pub use listing::{datasets_of_folder, is_server, list_datasets};
 
 /// Most bytes that are reserved before any of them has arrived.
 const RESERVE_BYTES: u64 = 4 << 20;

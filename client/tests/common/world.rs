@@ -1,4 +1,5 @@
 //! A dataset of a simulated scan, a server for it, and the real binary.
+#![allow(dead_code, reason = "each test needs a part of it")]
 
 use std::{
     net::{Ipv4Addr, SocketAddr},
@@ -21,15 +22,32 @@ impl Progress for Silent {
 /// A folder with the dataset in it, and its server.
 pub struct World {
     folder: tempfile::TempDir,
-    server: RunningServer,
+    server: Option<RunningServer>,
+    address: SocketAddr,
 }
 
 impl World {
     pub fn new() -> Self {
+        Self::of("sim:courtyard?points=60k&seed=3")
+    }
+
+    /// With that scan as its dataset.
+    pub fn of(scan: &str) -> Self {
         let folder = tempfile::tempdir().expect("temporary folder");
+        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let mut world = Self { folder, server: None, address };
+        world.add(scan, "courtyard");
+        let server = spawn(ServeConfig::new(world.folder.path(), address)).expect("serving");
+        world.address = server.addr();
+        world.server = Some(server);
+        world
+    }
+
+    /// Builds another dataset beside it.
+    pub fn add(&mut self, scan: &str, name: &str) {
         let config = BuildConfig {
-            inputs: vec!["sim:courtyard?points=60k&seed=3".into()],
-            output: folder.path().join("courtyard.lods"),
+            inputs: vec![scan.into()],
+            output: self.folder.path().join(format!("{name}.lods")),
             method: Method::default(),
             grid: 128,
             memory_bytes: 256 << 20,
@@ -41,14 +59,32 @@ impl World {
             cancel: Default::default(),
         };
         build(&config, &Silent).expect("built");
-        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = spawn(ServeConfig::new(folder.path(), address)).expect("serving");
-        Self { folder, server }
+    }
+
+    /// Closes the server's port and connections.
+    pub fn stop_server(&mut self) {
+        self.server = None;
+    }
+
+    /// Opens the same port again.
+    pub fn restart_server(&mut self) {
+        // The connections that were closed a moment ago may still hold the port.
+        self.server = Some(loop {
+            match spawn(ServeConfig::new(self.folder.path(), self.address)) {
+                Ok(server) => break server,
+                Err(_) => std::thread::yield_now(),
+            }
+        });
+    }
+
+    /// The server's address.
+    pub fn server_url(&self) -> String {
+        format!("http://{}", self.address)
     }
 
     /// The served dataset, as a source is named.
     pub fn source(&self) -> String {
-        format!("{}/courtyard", self.server.url())
+        format!("{}/courtyard", self.server_url())
     }
 
     pub fn path(&self, name: &str) -> PathBuf {

@@ -97,7 +97,7 @@ mod tests {
         let node = |count| {
             let key = NodeKey::ROOT;
             let points = NodePoints { positions: vec![[0; 3]; count], ..NodePoints::new(key) };
-            DrawNode { cloud: 0, key, spacing: 1.0, points: Arc::new(points) }
+            DrawNode { cloud: 0, key, spacing: 1.0, points: Arc::new(points), part: 0 }
         };
         let nodes = counts.map(node);
         let batch = Batch::of(&nodes);

@@ -12,15 +12,17 @@ mod eye_dome;
 mod footprint;
 mod paint;
 mod resolve;
+mod seen;
 mod stage;
 mod truth;
 
 #[cfg(test)]
 pub(super) mod tests;
 
+pub use seen::Seen;
 pub use truth::TruthRenderer;
 
-use crate::render::{DrawNode, Frame, RenderError, RenderSettings, Scene};
+use crate::render::{CloudColors, DrawNode, Frame, RenderError, RenderSettings, Scene};
 
 /// Draws on the CPU. Follows the rules of [`Splat`](crate::render::Splat) to the letter.
 #[derive(Debug, Clone, Copy, Default)]
@@ -32,8 +34,21 @@ impl CpuRenderer {
     /// # Errors
     /// [`RenderError::Settings`] and [`RenderError::Scene`] where the input cannot be drawn.
     pub fn render(&self, scene: &Scene, settings: &RenderSettings) -> Result<Frame, RenderError> {
+        self.render_colored(scene, settings, CloudColors::default())
+    }
+
+    /// Draws a scene, each cloud in colours of its own.
+    ///
+    /// # Errors
+    /// As for [`render`](Self::render).
+    pub fn render_colored(
+        &self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        colors: CloudColors,
+    ) -> Result<Frame, RenderError> {
         let renderer = TruthRenderer::new(settings, scene.clouds, scene.tree(), 1)?;
-        let mut renderer = renderer.of_nodes_in_memory();
+        let mut renderer = renderer.colored(colors).of_nodes_in_memory();
         let nodes = scene.ordered()?;
         for pass in 0..renderer.passes() {
             if pass > 0 {

@@ -16,7 +16,7 @@ use super::{
 use crate::{
     engine::DrawNode,
     render::{
-        RenderSettings, VisibleTree,
+        CloudColors, ColorMode, RenderSettings, VisibleTree,
         color::NodeColor,
         scene::Surroundings,
         size::NodeSize,
@@ -32,6 +32,8 @@ pub(super) struct Stage {
     pub samples: u32,
     pub view: View,
     pub clouds: Vec<Arc<Manifest>>,
+    /// Per cloud, where they are not those of the settings.
+    colors: Vec<Option<ColorMode>>,
     around: Surroundings,
     tree: VisibleTree,
     mesh: Mesh,
@@ -45,10 +47,17 @@ impl Stage {
         clouds: &[Arc<Manifest>],
         tree: VisibleTree,
     ) -> Self {
-        let around = Surroundings::of(clouds, settings.color);
+        let around = Surroundings::of(clouds, |_| settings.color);
         let view = View::new(&settings, samples, around.farthest(settings.camera.eye));
         let mesh = Mesh::new(settings.splat.footprint().rings(), &view);
-        Self { settings, samples, view, clouds: clouds.to_vec(), around, tree, mesh }
+        let (clouds, colors) = (clouds.to_vec(), Vec::new());
+        Self { settings, samples, view, clouds, colors, around, tree, mesh }
+    }
+
+    /// Colours each cloud by its own mode.
+    pub fn set_colors(&mut self, colors: CloudColors) {
+        self.around = Surroundings::of(&self.clouds, |cloud| colors.mode(cloud, &self.settings));
+        self.colors = colors.0.to_vec();
     }
 
     /// Columns and rows of samples.
@@ -60,7 +69,8 @@ impl Stage {
     /// The colours of a node's points.
     pub fn paint<'a>(&'a self, node: &'a DrawNode) -> NodePaint<'a> {
         let cloud = &self.clouds[node.cloud];
-        let surface = NodeSurface::of(&self.settings, cloud, &node.points);
+        let settings = self.settings_of(node.cloud);
+        let surface = NodeSurface::of(&settings, cloud, &node.points);
         let color = NodeColor::of(&self.around, node.cloud, &cloud.lattice, &node.points, &surface);
         let light = self.settings.shading.phong.then(|| Light {
             view: &self.view,
@@ -80,7 +90,8 @@ impl Stage {
         take: impl FnMut(usize, Fragment),
     ) {
         let cloud = &self.clouds[node.cloud];
-        let surface = NodeSurface::of(&self.settings, cloud, &node.points);
+        let settings = self.settings_of(node.cloud);
+        let surface = NodeSurface::of(&settings, cloud, &node.points);
         let bits = cloud.lattice.node_bits(node.key.level());
         let place = self.tree.place(node.cloud, node.key).unwrap_or(u32::MAX);
         let (size, spacing) = (self.settings.splat_size, node.spacing);
@@ -109,6 +120,10 @@ impl Stage {
                 strokes.draw(&oriented, take);
             }
         }
+    }
+
+    fn settings_of(&self, cloud: usize) -> RenderSettings {
+        CloudColors(&self.colors).settings(cloud, &self.settings)
     }
 
     fn node_view(&self, node: &DrawNode) -> NodeView {

@@ -31,7 +31,7 @@ use super::{batch::Batch, blend, canvas::Canvas, resolve::resolve, stage::Stage}
 use crate::{
     engine::DrawNode,
     render::{
-        ColorMode, Frame, FrameStatistics, RenderError, Shading, Splat, VisibleTree,
+        CloudColors, ColorMode, Frame, FrameStatistics, RenderError, Shading, Splat, VisibleTree,
         scene::Scene,
         settings::{LARGEST_SIDE_PX, RenderSettings},
     },
@@ -114,6 +114,17 @@ impl TruthRenderer {
             let mut random = fastrand::Rng::with_seed(seed);
             self.stage.view.half_size_px += DVec2::new(random.f64(), random.f64()) - 0.5;
         }
+        self
+    }
+
+    /// What pictures of a scene with one sample a pixel are drawn by.
+    pub(super) fn stage_of(settings: &RenderSettings, scene: &Scene) -> Stage {
+        Stage::new(*settings, 1, scene.clouds, scene.tree())
+    }
+
+    /// Colours each cloud by its own mode.
+    pub(super) fn colored(mut self, colors: CloudColors) -> Self {
+        self.stage.set_colors(colors);
         self
     }
 

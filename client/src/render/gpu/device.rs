@@ -44,6 +44,11 @@ impl Device {
             let advice = "install a driver (Debian, Ubuntu: mesa-vulkan-drivers)";
             RenderError::NoGpu(format!("no Vulkan, Metal or DirectX 12 adapter; {advice}"))
         })?;
+        Self::on(&adapter, least)
+    }
+
+    /// On an adapter of the caller's choice.
+    pub fn on(adapter: &wgpu::Adapter, least: bool) -> Result<Self, RenderError> {
         let info = adapter.get_info();
         let name = format!("{} ({:?}, {})", info.name, info.device_type, info.backend);
         let lacks = |what: &str| RenderError::NoGpu(format!("{name} lacks {what}"));

@@ -38,8 +38,8 @@ pub use self::{
     pipelines::shader_bytes,
 };
 use crate::render::{
-    ColorMode, Frame, FrameStatistics, PointsPerPixel, RenderError, RenderSettings, Scene,
-    ramp::Ramp, scene::Surroundings, view::View,
+    CloudColors, ColorMode, Frame, FrameStatistics, Picture, PointsPerPixel, RenderError,
+    RenderSettings, Scene, ramp::Ramp, scene::Surroundings, view::View,
 };
 
 /// Splats that may be larger are not tried by compute, unless asked for: one invocation draws all
@@ -55,6 +55,17 @@ pub struct GpuRenderer {
     target: Option<Target>,
     path: GpuPath,
     choice: Choice,
+    /// What the picture in `target` is like.
+    drawn: Option<Drawn>,
+}
+
+/// What the last picture is like.
+#[derive(Clone, Copy)]
+struct Drawn {
+    /// Whether eye-dome lighting was the last pass.
+    lit: bool,
+    near: f32,
+    depth_bias: f32,
 }
 
 /// A frame on its way.
@@ -74,7 +85,19 @@ impl GpuRenderer {
     /// # Errors
     /// [`RenderError::NoGpu`] where there is no usable adapter: draw on the CPU.
     pub fn new(config: GpuConfig) -> Result<Self, RenderError> {
-        let device = Device::open(config.least_adapter)?;
+        Self::with(Device::open(config.least_adapter)?, config)
+    }
+
+    /// On an adapter that can also show pictures on a window. [`device`](Self::device) is then what shows
+    /// them.
+    ///
+    /// # Errors
+    /// [`RenderError::NoGpu`] where the adapter lacks what drawing needs.
+    pub fn on(adapter: &wgpu::Adapter, config: GpuConfig) -> Result<Self, RenderError> {
+        Self::with(Device::on(adapter, config.least_adapter)?, config)
+    }
+
+    fn with(device: Device, config: GpuConfig) -> Result<Self, RenderError> {
         let pipelines = Pipelines::new(&device.device, device.pixels, device.sums_format);
         let pool = Pool::new(&device, pipelines.page_layout.clone(), &config);
         let tables = Ramp::IN_SHADERS.iter().flat_map(|ramp| ramp.table());
@@ -82,8 +105,8 @@ impl GpuRenderer {
         let storage = wgpu::BufferUsages::STORAGE;
         let ramps = device.filled("ramps", storage, bytemuck::cast_slice(&ramps));
         device.check()?;
-        let (target, choice) = (None, Choice::default());
-        Ok(Self { device, pipelines, pool, ramps, target, path: config.path, choice })
+        let (target, choice, drawn) = (None, Choice::default(), None);
+        Ok(Self { device, pipelines, pool, ramps, target, path: config.path, choice, drawn })
     }
 
     /// Adapter, kind and backend, for a user.
@@ -102,7 +125,7 @@ impl GpuRenderer {
         scene: &Scene,
         settings: &RenderSettings,
     ) -> Result<Frame, RenderError> {
-        let submitted = self.submit(scene, settings)?;
+        let submitted = self.submit(scene, settings, CloudColors::default())?;
         let device = &self.device;
         let Some(target) = &mut self.target else {
             return Err(RenderError::Gpu("the picture is gone".into()));
@@ -144,12 +167,59 @@ impl GpuRenderer {
         scene: &Scene,
         settings: &RenderSettings,
     ) -> Result<FrameStatistics, RenderError> {
-        let submitted = self.submit(scene, settings)?;
+        self.draw_colored(scene, settings, CloudColors::default())
+    }
+
+    /// The same, each cloud in colours of its own.
+    ///
+    /// # Errors
+    /// As for [`render`](Self::render).
+    pub fn draw_colored(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        colors: CloudColors,
+    ) -> Result<FrameStatistics, RenderError> {
+        let submitted = self.submit(scene, settings, colors)?;
         let wait = wgpu::PollType::wait_indefinitely();
         self.device.device.poll(wait).map_err(|e| RenderError::Gpu(e.to_string()))?;
         self.device.check()?;
         self.took(&submitted);
         Ok(submitted.statistics)
+    }
+
+    /// The device and its queue.
+    #[must_use]
+    pub const fn device(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.device.device, &self.device.queue)
+    }
+
+    /// What went wrong since the last look, on this device and by whomever.
+    ///
+    /// # Errors
+    /// [`RenderError::Gpu`] says what did.
+    pub fn check(&self) -> Result<(), RenderError> {
+        self.device.check()
+    }
+
+    /// The colours of the last picture, where they were left; for shaders to read.
+    #[must_use]
+    pub fn picture_view(&self) -> Option<&wgpu::TextureView> {
+        Some(self.target.as_ref()?.shown(self.drawn?.lit))
+    }
+
+    /// Takes the last picture that was left where it is.
+    ///
+    /// # Errors
+    /// [`RenderError::Gpu`] where the GPU fails, or where nothing was drawn yet.
+    pub fn take_picture(&mut self) -> Result<Picture, RenderError> {
+        let (Some(target), Some(drawn)) = (&mut self.target, self.drawn) else {
+            return Err(RenderError::Gpu("nothing was drawn yet".into()));
+        };
+        let mut encoder = self.device.device.create_command_encoder(&Default::default());
+        target.copy(&self.device, &mut encoder, drawn.lit);
+        self.device.queue.submit([encoder.finish()]);
+        target.read(&self.device, |depth| drawn.near / depth - drawn.depth_bias)
     }
 
     /// Takes the device away, as a reset or an unplugged adapter does.
@@ -173,6 +243,7 @@ impl GpuRenderer {
         &mut self,
         scene: &Scene,
         settings: &RenderSettings,
+        colors: CloudColors,
     ) -> Result<Submitted, RenderError> {
         settings.check()?;
         let size_px = settings.size_px;
@@ -185,10 +256,11 @@ impl GpuRenderer {
         }
         let nodes = scene.ordered()?;
         let since = Instant::now();
-        let around = Surroundings::of(scene.clouds, settings.color);
+        let around = Surroundings::of(scene.clouds, |cloud| colors.mode(cloud, settings));
         let view = View::new(settings, 1, around.farthest(settings.camera.eye));
         let tree = scene.tree();
-        let frame = plan::Frame { scene, settings, around: &around, tree: &tree, view: &view };
+        let frame =
+            plan::Frame { colors, scene, settings, around: &around, tree: &tree, view: &view };
         self.pool.begin_frame();
         let mut plan = Plan::default();
         for node in &nodes {
@@ -247,6 +319,8 @@ impl GpuRenderer {
         }
         self.device.queue.submit([encoder.finish()]);
         self.target = Some(target);
+        let (near, depth_bias) = (view.near as f32, view.depth_bias as f32);
+        self.drawn = Some(Drawn { lit: dome.is_some(), near, depth_bias });
         let (resident_bytes, uploaded_bytes) = self.pool.bytes();
         let statistics = FrameStatistics {
             nodes: plan.nodes.len() as u64,

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     engine::DrawNode,
     render::{
-        ColorMode, RenderSettings, Scene, Splat, SplatSize, VisibleTree,
+        CloudColors, ColorMode, RenderSettings, Scene, Splat, SplatSize, VisibleTree,
         color::NodeColor,
         scene::Surroundings,
         settings::CLOSED_SURFACE,
@@ -47,6 +47,7 @@ pub struct Plan {
 
 /// What all nodes of a frame share.
 pub struct Frame<'a> {
+    pub colors: CloudColors<'a>,
     pub scene: &'a Scene<'a>,
     pub settings: &'a RenderSettings,
     pub around: &'a Surroundings,
@@ -88,7 +89,8 @@ impl Frame<'_> {
             NodeColor::Elevation { .. } => ColorSource::Elevation,
             NodeColor::Constant(_) => ColorSource::Node,
         };
-        splatting(self.settings, &self.scene.clouds[cloud], color)
+        let settings = self.colors.settings(cloud, self.settings);
+        splatting(&settings, &self.scene.clouds[cloud], color)
     }
 }
 
@@ -120,7 +122,8 @@ impl Plan {
         if points.positions.is_empty() {
             return;
         }
-        let Frame { scene, settings, around, tree, view } = frame;
+        let Frame { scene, around, tree, view, colors, settings } = frame;
+        let settings = &colors.settings(node.cloud, settings);
         let cloud = &scene.clouds[node.cloud];
         let lattice = &cloud.lattice;
         let surface = NodeSurface::of(settings, cloud, points);
@@ -130,7 +133,7 @@ impl Plan {
         // What takes no payload shares its records.
         let payload = if color.payload_bits() == 0 { ColorSource::Node } else { color };
         let fields = RecordFields { color: payload, normals, shape };
-        let Some(resident) = pool.node(device, cloud, points, fields, &colors, &surface) else {
+        let Some(resident) = pool.node(device, cloud, node, fields, &colors, &surface) else {
             self.waiting_nodes += 1;
             return;
         };

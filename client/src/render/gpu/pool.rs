@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use lodestream_protocol::{Manifest, NodeKey, NodePoints};
+use lodestream_protocol::{Manifest, NodeKey};
 use lodestream_shaders::CHUNK_POINTS;
 use lru::LruCache;
 
@@ -18,7 +18,7 @@ use super::{
     pack::{RecordFields, RecordLayout, pack},
     ranges::FreeRanges,
 };
-use crate::render::{color::NodeColor, surface::NodeSurface};
+use crate::render::{DrawNode, color::NodeColor, surface::NodeSurface};
 
 /// A page.
 struct Page {
@@ -56,6 +56,8 @@ struct Key {
     node: NodeKey,
     /// How exactly its points are placed.
     cell_bits: u8,
+    /// Which of the node's points.
+    part: u64,
     fields: RecordFields,
 }
 
@@ -128,14 +130,16 @@ impl Pool {
         &mut self,
         device: &Device,
         cloud: &Arc<Manifest>,
-        points: &NodePoints,
+        node: &DrawNode,
         fields: RecordFields,
         colors: &NodeColor,
         surface: &NodeSurface,
     ) -> Option<&Resident> {
+        let points = node.points.as_ref();
         let key = Key {
             cloud: Arc::as_ptr(cloud).addr(),
             node: points.key,
+            part: node.part,
             cell_bits: points.cell_bits,
             fields,
         };

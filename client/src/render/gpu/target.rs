@@ -47,7 +47,7 @@ impl Target {
     /// The texture of the picture after eye-dome lighting, made if it is not there yet.
     pub fn lit(&mut self, device: &wgpu::Device) -> wgpu::TextureView {
         let (_, view) = self.lit.get_or_insert_with(|| {
-            let usage = wgpu::TextureUsages::COPY_SRC;
+            let usage = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::TEXTURE_BINDING;
             let lit = texture(device, "lit colour", COLOR_FORMAT, self.size_px, usage);
             let view = lit.create_view(&Default::default());
             (lit, view)
@@ -63,6 +63,11 @@ impl Target {
                 .create_view(&Default::default())
         });
         view.clone()
+    }
+
+    /// What is seen, lit if so.
+    pub fn shown(&self, lit: bool) -> &wgpu::TextureView {
+        self.lit.as_ref().filter(|_| lit).map_or(&self.color_view, |(_, view)| view)
     }
 
     /// Buffers for what the compute path finds, made if they are not there yet.

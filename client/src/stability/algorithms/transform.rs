@@ -238,7 +238,7 @@ fn extreme_picture(case: &'static str, size_px: [u32; 2]) -> Result<Row, Stabili
 /// The one point of a cloud.
 fn point_of(cloud: usize) -> DrawNode {
     let points = NodePoints { positions: vec![[0; 3]], ..NodePoints::new(NodeKey::ROOT) };
-    DrawNode { cloud, key: NodeKey::ROOT, spacing: 1.0, points: Arc::new(points) }
+    DrawNode { cloud, key: NodeKey::ROOT, spacing: 1.0, points: Arc::new(points), part: 0 }
 }
 
 fn manifest(lattice: Lattice) -> Manifest {

@@ -58,7 +58,7 @@ fn adaptive_sizes_follow_the_deepest_node_that_is_drawn_where_the_point_is() {
     let child = NodeKey::new(1, coords).expect("a child of the root");
     let mut empty = scene.nodes[0].points.as_ref().clone();
     (empty.key, empty.positions, empty.columns) = (child, Vec::new(), Vec::new());
-    let node = DrawNode { cloud: 0, key: child, spacing: 3.0, points: Arc::new(empty) };
+    let node = DrawNode { cloud: 0, key: child, spacing: 3.0, points: Arc::new(empty), part: 0 };
     let picture = |scene: &TestScene, size| render(scene, &two(size)).picture;
 
     assert_eq!(widths(&picture(&scene, SplatSize::Adaptive(1.0))), [9, 9]);

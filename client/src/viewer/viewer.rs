@@ -1,0 +1,529 @@
+//! What the viewer knows: the clouds, the view, what is kept and what is under way.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Instant,
+};
+
+use glam::DVec3;
+use serde_json::json;
+
+use super::{
+    clouds::Cloud,
+    events::Events,
+    export::Export,
+    filter::{Filter, Shown},
+    frame::LastPicture,
+    frame_times::FrameTimes,
+    jobs::{Answer, Jobs},
+    measurement::Measurement,
+    messages::{Messages, Weight},
+    navigation::Navigator,
+    open_dialog::OpenDialog,
+    options::ViewOptions,
+    picking::Picked,
+    point_values::{self, Values},
+    recording::{Player, Recorder},
+    session::{Bookmark, Session},
+    settings::Settings,
+};
+use crate::{
+    camera::Camera,
+    engine::{ClipBox, Engine, EngineConfig, EngineError, EngineStats, FramePlan},
+    path::{CameraPath, Extent, PathSource},
+    render::FrameStatistics,
+    source::Source,
+};
+
+/// What a click on the picture does.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Tool {
+    /// Tells of the point.
+    #[default]
+    Pick,
+    /// Measures from one point to another: from this one, once it is there.
+    Measure(Option<[f64; 3]>),
+}
+
+/// A point that was picked, and what is known of it.
+#[derive(Debug, Clone)]
+pub struct Pick {
+    /// Which pick it is.
+    pub number: u64,
+    /// The point.
+    pub point: Picked,
+    /// Its attributes, once they are there.
+    pub values: Option<Result<Values, String>>,
+}
+
+/// A clip box, in use or not.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Clip {
+    /// Whether it limits the view.
+    pub is_on: bool,
+    /// The box, once there is one.
+    pub bounds: Option<ClipBox>,
+}
+
+impl Clip {
+    /// The box, where it is in use.
+    #[must_use]
+    pub fn active(&self) -> Option<ClipBox> {
+        self.bounds.filter(|_| self.is_on)
+    }
+}
+
+/// Texts of fields in the panel.
+#[derive(Debug, Clone)]
+pub struct Fields {
+    /// Where the session is kept.
+    pub session: String,
+    /// Where the camera path is kept.
+    pub path: String,
+    /// Where exported pictures go.
+    pub export: String,
+    /// How many there are to be.
+    pub export_frames: u32,
+    /// The name of the next bookmark.
+    pub bookmark: String,
+}
+
+/// What the viewer knows.
+pub struct Viewer {
+    pub engine: Engine,
+    pub clouds: Vec<Cloud>,
+    pub navigator: Navigator,
+    pub settings: Settings,
+    settings_file: Option<PathBuf>,
+    /// As they were kept last.
+    kept: Settings,
+    /// Where pictures go.
+    pub folder: PathBuf,
+    pub clip: Clip,
+    /// The clip box was switched on: its section is to be opened.
+    pub opens_clip: bool,
+    pub bookmarks: Vec<Bookmark>,
+    pub measurements: Vec<Measurement>,
+    pub tool: Tool,
+    pub picked: Option<Pick>,
+    picks: u64,
+    pub messages: Messages,
+    pub frame_times: FrameTimes,
+    pub events: Events,
+    pub jobs: Jobs,
+    pub recorder: Option<Recorder>,
+    pub path: Option<CameraPath>,
+    /// A generator from the command line that waits for clouds.
+    waiting_path: Option<PathSource>,
+    pub player: Option<Player>,
+    pub export: Option<Export>,
+    /// Whether a picture of the export is being written.
+    pub is_writing: bool,
+    pub open_dialog: OpenDialog,
+    pub fields: Fields,
+    pub shows_help: bool,
+    pub is_closing: bool,
+    /// A picture of the view is to be written.
+    pub wants_picture: bool,
+    /// The newest plan that was taken, and what is shown of it.
+    pub plan: Arc<FramePlan>,
+    pub filter: Filter,
+    pub shown: Shown,
+    pub last: LastPicture,
+    pub statistics: FrameStatistics,
+    pub stats: EngineStats,
+    pub renderer: String,
+    /// Where the picture is in the window, and its size.
+    pub view_rect: egui::Rect,
+    pub size_px: [u32; 2],
+    /// The camera of the last picture.
+    pub camera: Camera,
+    /// A drag under way.
+    pub drag: Option<super::view::Drag>,
+    /// The view that nobody has chosen yet is of this extent, in a picture of this aspect.
+    pub first_view: Option<(DVec3, DVec3, f64)>,
+    /// What is zoomed to: the place under the cursor, as long as that is where it was.
+    pub anchor: Option<(egui::Pos2, DVec3)>,
+}
+
+impl Viewer {
+    /// Starts the engine, and opens what the options say. `wake` is called, from any thread, when there is
+    /// something new.
+    ///
+    /// # Errors
+    /// [`EngineError::Thread`] where the system gives no threads.
+    pub fn start(
+        mut options: ViewOptions,
+        wake: Arc<dyn Fn() + Send + Sync>,
+    ) -> Result<Self, EngineError> {
+        let settings = options.settings.clone();
+        let config = EngineConfig {
+            point_budget: settings.point_budget,
+            min_size_px: settings.min_node_px,
+            cache_bytes: settings.cache_mib << 20,
+            attributes: settings.look.color.attribute().map(str::to_owned).into_iter().collect(),
+            ..EngineConfig::default()
+        };
+        let engine = Engine::start(Vec::new(), config)?;
+        let news = Arc::clone(&wake);
+        engine.on_news(move || news());
+        let text = |name: &str| options.folder.join(name).display().to_string();
+        let fields = Fields {
+            session: text("session.json"),
+            path: text("path.json"),
+            export: text("frames"),
+            export_frames: 120,
+            bookmark: String::new(),
+        };
+        let mut viewer = Self {
+            engine,
+            clouds: Vec::new(),
+            navigator: Navigator::default(),
+            kept: settings.clone(),
+            settings,
+            settings_file: options.settings_file.take(),
+            folder: options.folder.clone(),
+            clip: Clip { is_on: options.clip.is_some(), bounds: options.clip },
+            opens_clip: false,
+            bookmarks: Vec::new(),
+            measurements: Vec::new(),
+            tool: Tool::default(),
+            picked: None,
+            picks: 0,
+            messages: Messages::default(),
+            frame_times: FrameTimes::default(),
+            events: Events::new(options.events),
+            jobs: Jobs::new(wake),
+            recorder: None,
+            path: None,
+            waiting_path: None,
+            player: None,
+            export: None,
+            is_writing: false,
+            open_dialog: OpenDialog::default(),
+            fields,
+            shows_help: false,
+            is_closing: false,
+            wants_picture: false,
+            plan: Arc::default(),
+            filter: Filter::default(),
+            shown: Shown::default(),
+            last: LastPicture::default(),
+            statistics: FrameStatistics::default(),
+            stats: EngineStats::default(),
+            renderer: String::new(),
+            view_rect: egui::Rect::NOTHING,
+            size_px: [1, 1],
+            camera: Camera::overview(DVec3::ZERO, DVec3::ONE, 1.5),
+            drag: None,
+            first_view: None,
+            anchor: None,
+        };
+        viewer.open_first(options);
+        Ok(viewer)
+    }
+
+    fn open_first(&mut self, options: ViewOptions) {
+        if let Some(trouble) = options.settings_trouble {
+            self.warn(trouble);
+        }
+        if let Some(file) = &options.session {
+            self.fields.session = file.display().to_string();
+            self.open_session(file);
+            if let Some(look) = options.look {
+                self.settings.look = look;
+            }
+            if options.budget_given {
+                self.settings.point_budget = options.settings.point_budget;
+                self.settings.min_node_px = options.settings.min_node_px;
+            }
+            if options.clip.is_some() {
+                self.clip = Clip { is_on: true, bounds: options.clip };
+            }
+        }
+        for source in &options.sources {
+            self.open(source);
+        }
+        for server in options.servers {
+            self.list(server);
+        }
+        if let Some(camera) = &options.camera {
+            self.navigator.jump(camera);
+        }
+        match options.path {
+            Some(PathSource::File(path)) => self.play(path),
+            generator => self.waiting_path = generator,
+        }
+        self.open_dialog.is_open |= self.clouds.is_empty();
+    }
+
+    /// Tells something that did not go as asked.
+    pub fn warn(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        self.events.tell("message", json!({ "warning": true, "text": text }));
+        self.messages.tell(Weight::Warning, text);
+    }
+
+    /// Tells something that was done.
+    pub fn note(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        self.events.tell("message", json!({ "warning": false, "text": text }));
+        self.messages.tell(Weight::Note, text);
+    }
+
+    /// Opens a dataset.
+    pub fn open(&mut self, source: &str) {
+        self.add(Cloud::new(source));
+    }
+
+    fn add(&mut self, cloud: Cloud) {
+        let source = match Source::parse(&cloud.source) {
+            Ok(source) => source,
+            Err(error) => return self.warn(error.to_string()),
+        };
+        self.settings.note_recent(&cloud.source);
+        let number = self.engine.add(source);
+        self.engine.set_visible(number, cloud.is_visible);
+        debug_assert_eq!(number, self.clouds.len());
+        self.clouds.push(cloud);
+        self.open_dialog.is_open = false;
+    }
+
+    /// Closes a cloud.
+    pub fn close(&mut self, number: usize) {
+        let Some(cloud) = self.clouds.get_mut(number) else { return };
+        cloud.is_closed = true;
+        self.engine.remove(number);
+        if self.picked.as_ref().is_some_and(|pick| pick.point.cloud == number) {
+            self.picked = None;
+        }
+    }
+
+    /// Closes all of them.
+    fn close_all(&mut self) {
+        (0..self.clouds.len()).for_each(|number| {
+            if !self.clouds[number].is_closed {
+                self.close(number);
+            }
+        });
+    }
+
+    /// Shows a cloud or does not.
+    pub fn set_visible(&mut self, number: usize, is_visible: bool) {
+        if let Some(cloud) = self.clouds.get_mut(number) {
+            cloud.is_visible = is_visible;
+            self.engine.set_visible(number, is_visible);
+        }
+    }
+
+    /// Numbers and clouds that are open.
+    pub fn open_clouds(&self) -> impl Iterator<Item = (usize, &Cloud)> {
+        self.clouds.iter().enumerate().filter(|(_, cloud)| !cloud.is_closed)
+    }
+
+    /// Asks a server what it has.
+    pub fn list(&mut self, server: String) {
+        self.open_dialog.begin_list(&server);
+        self.jobs.start(move || {
+            let index = crate::source::list_datasets(&server).map_err(|e| e.to_string());
+            Answer::List { server, index }
+        });
+    }
+
+    /// Opens a session in place of what is open.
+    pub fn open_session(&mut self, file: &Path) {
+        let session = match Session::open(file) {
+            Ok(session) => session,
+            Err(error) => return self.warn(error.to_string()),
+        };
+        self.close_all();
+        self.settings.look = session.look;
+        self.settings.point_budget = session.point_budget.unwrap_or(self.settings.point_budget);
+        self.settings.min_node_px = session.min_node_px.unwrap_or(self.settings.min_node_px);
+        self.clip = Clip { is_on: session.clip.is_some(), bounds: session.clip };
+        self.bookmarks = session.bookmarks;
+        self.measurements = session.measurements;
+        for cloud in &session.clouds {
+            self.add(Cloud::from_session(cloud));
+        }
+        if let Some(camera) = &session.camera {
+            self.navigator.jump(camera);
+        }
+        self.events.tell("session", json!({ "opened": file }));
+        self.messages.tell(Weight::Note, format!("Opened {}", file.display()));
+    }
+
+    /// Saves what is looked at, from where and how.
+    pub fn save_session(&mut self, file: &Path) {
+        let clouds = self.open_clouds().map(|(_, cloud)| cloud.to_session()).collect();
+        let mut session = Session::new(clouds);
+        session.camera = Some(self.camera);
+        session.look = self.settings.look;
+        session.point_budget = Some(self.settings.point_budget);
+        session.min_node_px = Some(self.settings.min_node_px);
+        session.clip = self.clip.active();
+        session.bookmarks.clone_from(&self.bookmarks);
+        session.measurements.clone_from(&self.measurements);
+        match session.save(file) {
+            Ok(()) => {
+                self.events.tell("session", json!({ "saved": file }));
+                self.messages.tell(Weight::Note, format!("Saved {}", file.display()));
+            }
+            Err(error) => self.warn(error.to_string()),
+        }
+    }
+
+    /// Keeps the settings for the next start, where they have changed.
+    pub fn keep_settings(&mut self) {
+        let Some(file) = &self.settings_file else { return };
+        if self.settings == self.kept {
+            return;
+        }
+        if let Err(error) = self.settings.keep(file) {
+            tracing::warn!("{error}");
+            eprintln!("note: {error}");
+        }
+        self.kept = self.settings.clone();
+    }
+
+    /// Lowest and highest corner of all clouds that are open and shown.
+    #[must_use]
+    pub fn extent(&self) -> Option<(DVec3, DVec3)> {
+        let shown = self.open_clouds().filter(|(_, cloud)| cloud.is_visible);
+        let bounds = shown.filter_map(|(_, cloud)| cloud.bounds());
+        bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// Width over height of the picture.
+    #[must_use]
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.size_px[0]) / f64::from(self.size_px[1])
+    }
+
+    /// Takes the engine's news: how the clouds are, the newest plan.
+    pub fn take_news(&mut self) {
+        let statuses = self.engine.clouds();
+        let mut told = Vec::new();
+        for (number, (cloud, status)) in self.clouds.iter_mut().zip(statuses).enumerate() {
+            let trouble = status.failure.clone().or_else(|| status.trouble.clone());
+            let before = cloud.status.failure.clone().or_else(|| cloud.status.trouble.clone());
+            cloud.set_status(status);
+            if cloud.is_closed {
+                continue;
+            }
+            if trouble != before {
+                told.push(("cloud", json!({ "cloud": number, "trouble": trouble })));
+            }
+            if !cloud.is_told
+                && let Some(manifest) = cloud.manifest()
+            {
+                let (source, points) = (&cloud.source, manifest.points);
+                told.push((
+                    "opened",
+                    json!({ "cloud": number, "source": source, "points": points }),
+                ));
+                cloud.is_told = true;
+            }
+        }
+        told.into_iter().for_each(|(name, what)| self.events.tell(name, what));
+        self.stats = self.engine.stats();
+        if let Some((min, max)) = self.extent() {
+            self.navigator.set_extent(min, max);
+            if let Some(source) = self.waiting_path.take() {
+                let extent = Extent::new(min.into(), max.into());
+                match extent.and_then(|extent| source.path(&extent)) {
+                    Ok(path) => self.play(path),
+                    Err(error) => self.warn(error.to_string()),
+                }
+            }
+        }
+    }
+
+    /// Takes what jobs have ended with.
+    pub fn take_answers(&mut self) {
+        for answer in self.jobs.answers() {
+            match answer {
+                Answer::List { server, index } => {
+                    let found = index.as_ref().map(|index| index.datasets.len());
+                    self.events.tell("list", json!({ "server": server, "datasets": found.ok() }));
+                    self.open_dialog.end_list(server, index);
+                }
+                Answer::Values { pick, values } => {
+                    if let Some(picked) = self.picked.as_mut().filter(|p| p.number == pick) {
+                        let told = json!({ "values": values.as_ref().ok() });
+                        self.events.tell("values", told);
+                        picked.values = Some(values);
+                    }
+                }
+                Answer::Picture { file, exported, outcome } => {
+                    self.events
+                        .tell("picture", json!({ "file": file, "error": outcome.as_ref().err() }));
+                    self.is_writing &= !exported;
+                    match outcome {
+                        Ok(()) if exported => {}
+                        Ok(()) => {
+                            self.messages.tell(Weight::Note, format!("Wrote {}", file.display()))
+                        }
+                        Err(error) => {
+                            self.export = None;
+                            self.messages.tell(Weight::Warning, error);
+                        }
+                    }
+                }
+                Answer::Path(Ok(path)) => {
+                    self.note(format!("A path of {:.1} s", path.duration()));
+                    self.path = Some(path);
+                }
+                Answer::Path(Err(error)) => self.warn(error),
+            }
+        }
+    }
+
+    /// Notes a point that was picked; asks for its attributes.
+    pub fn set_picked(&mut self, point: Picked) {
+        self.picks += 1;
+        let number = self.picks;
+        let cloud = &self.clouds[point.cloud];
+        self.events.tell(
+            "picked",
+            json!({
+                "cloud": point.cloud, "world": point.world, "text": point.text,
+                "level": point.key.level(), "crs": cloud.crs.name,
+            }),
+        );
+        let (source, key, index) = (cloud.source.clone(), point.key, point.point);
+        self.jobs.start(move || Answer::Values {
+            pick: number,
+            values: point_values::fetch(&source, key, index),
+        });
+        if let Tool::Measure(from) = &mut self.tool {
+            match from.take() {
+                None => *from = Some(point.world),
+                Some(start) => {
+                    let measured = Measurement { from: start, to: point.world };
+                    self.measurements.push(measured);
+                    self.events.tell(
+                        "measured",
+                        json!({ "distance": measured.distance(), "height": measured.height() }),
+                    );
+                }
+            }
+        }
+        self.picked = Some(Pick { number, point, values: None });
+    }
+
+    /// Plays a path from its begin.
+    pub fn play(&mut self, path: CameraPath) {
+        self.recorder = None;
+        self.path = Some(path);
+        self.player = Some(Player::start(Instant::now()));
+    }
+
+    /// Ends whatever moves the camera by itself; hands take over where it is.
+    pub fn take_over(&mut self) {
+        if self.player.take().is_some() || self.export.take().is_some() {
+            self.navigator.jump(&self.camera);
+        }
+    }
+}
