@@ -8,7 +8,8 @@
 //! | --- | --- |
 //! | `GET /` | the list of datasets as a small page |
 //! | `GET /datasets` | the list as JSON: [`DatasetIndex`] |
-//! | `GET`, `HEAD /datasets/NAME.lods`, `/NAME.lods` | the file, whole or by range |
+//! | `GET`, `HEAD /datasets/NAME.lods`, `/NAME.lods` | the file, whole or by range; with `?v=` and its tag, this very content |
+//! | `POST /datasets/NAME.lods/batch`, `/NAME.lods/batch` | many parts of the file by one request |
 //! | `GET /healthz` | `ok` while the folder can be read |
 //!
 //! [`Server`] is bound, then run on the caller's runtime; [`spawn`] runs one on a thread of its
@@ -26,7 +27,9 @@ mod error;
 mod file;
 mod folder;
 mod index;
+mod multipart;
 mod offload;
+mod open_files;
 mod range;
 mod routes;
 mod running;

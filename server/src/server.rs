@@ -3,7 +3,7 @@
 //! The loop is axum's own, but for what that one does not offer: a limit on connections, timeouts
 //! on slow clients, and an end to draining.
 
-use std::{future::Future, net::SocketAddr, pin::pin, time::Duration};
+use std::{future::Future, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
 
 use axum::Router;
 use hyper_util::server::graceful::GracefulShutdown;
@@ -22,6 +22,7 @@ pub struct Server {
     listener: TcpListener,
     addr: SocketAddr,
     router: Router,
+    site: Arc<Site>,
     config: ServeConfig,
 }
 
@@ -35,8 +36,8 @@ impl Server {
         let failed = |source| Error::Listen { addr: config.listen, source };
         let listener = TcpListener::bind(config.listen).await.map_err(failed)?;
         let addr = listener.local_addr().map_err(failed)?;
-        let router = routes::router(site, config.response_timeout);
-        Ok(Self { listener, addr, router, config })
+        let router = routes::router(Arc::clone(&site), config.response_timeout);
+        Ok(Self { listener, addr, router, site, config })
     }
 
     /// The address it listens on, with the port that was taken for port 0.
@@ -51,6 +52,7 @@ impl Server {
         let limits = ConnectionLimits::from(&self.config);
         let graceful = GracefulShutdown::new();
         let mut connections = JoinSet::new();
+        let sweeping = tokio::spawn(self.site.sweep());
         let mut shutdown = pin!(shutdown);
         loop {
             tokio::select! {
@@ -79,6 +81,7 @@ impl Server {
             tracing::warn!("{} connections cut off at shutdown", connections.len());
         }
         connections.shutdown().await;
+        sweeping.abort();
     }
 }
 

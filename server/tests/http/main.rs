@@ -1,6 +1,8 @@
 //! The server over real HTTP: a folder of real files, port 0, a real client.
 
+mod batch;
 mod conditional;
+mod file;
 mod folder;
 mod names;
 mod ranges;
