@@ -263,6 +263,32 @@ mod tests {
     }
 
     #[test]
+    fn the_example_of_the_specification_is_what_is_sent() {
+        let text = include_str!("../../docs/PROTOCOL.md");
+        let (_, example) = text.split_once("### Example").expect("the example");
+        let is_hex = |word: &&str| word.len() == 2 && word.bytes().all(|b| b.is_ascii_hexdigit());
+        let blocks: Vec<Vec<u8>> = example
+            .split("\n\n")
+            .filter(|block| block.starts_with("    "))
+            .map(|block| {
+                let words = block.split_whitespace().filter(is_hex);
+                words.map(|word| u8::from_str_radix(word, 16).expect("hexadecimal")).collect()
+            })
+            .collect();
+        let [body, response] = &blocks[..] else { panic!("{} blocks", blocks.len()) };
+        let content_id = std::array::from_fn(|i| i as u8);
+        let asked = BatchRequest { content_id, ..request(&[(1000, 3), (64, 2)]) };
+        assert_eq!(asked.encode().as_ref(), Ok(body));
+        assert_eq!(BatchRequest::decode(body).as_ref(), Ok(&asked));
+        let mut decoder = BatchDecoder::new(asked);
+        let payload = decode(&mut decoder, response).expect("a good answer");
+        assert_eq!(payload, [0xAA, 0xBB, 0xCC, 0xDD, 0xEE]);
+        assert!(decoder.is_complete());
+        assert_eq!(response[..BATCH_HEAD_BYTES], batch_head(&content_id));
+        assert_eq!(response[24..32], frame_head(0, 3));
+    }
+
+    #[test]
     fn another_answer_is_refused() {
         let asked = request(&[(0, 3), (100, 2)]);
         let (good, _) = response(&asked);

@@ -11,7 +11,10 @@ use axum::http::HeaderValue;
 use lodestream_preprocess::FileSource;
 use lodestream_protocol::{Error as FormatError, HEADER_BYTES, Header};
 
-use crate::conditional::{Validators, http_date};
+use crate::{
+    conditional::{Validators, http_date},
+    private_copy::CopyState,
+};
 
 /// An open file whose header is sound and which is as long as its header says.
 #[derive(Debug)]
@@ -27,6 +30,9 @@ pub(crate) struct DatasetFile {
     pub(crate) etag: HeaderValue,
     /// The modification time as a response carries it.
     pub(crate) last_modified: Option<HeaderValue>,
+    pub(crate) private_copy: CopyState,
+    /// Length and modification time when it was opened.
+    opened_as: (u64, Option<SystemTime>),
 }
 
 /// Tells whether a path still leads to the file that was looked at.
@@ -88,9 +94,18 @@ impl DatasetFile {
             content_id: header.content_id,
             etag: HeaderValue::from_str(&validators.etag).map_err(unreadable)?,
             last_modified: validators.modified.and_then(|m| m.to_string().try_into().ok()),
+            private_copy: CopyState::default(),
+            opened_as: (length, metadata.modified().ok()),
             validators,
         };
         Ok((Identity::of(&metadata), file))
+    }
+
+    /// Whether nobody has cut the file short or written to it since it was opened. Asked after bytes
+    /// were read: they are those of the dataset then, as a file is shorter before its bytes are gone.
+    pub(crate) fn is_unchanged(&self) -> bool {
+        let metadata = self.source.file().metadata();
+        metadata.is_ok_and(|now| (now.len(), now.modified().ok()) == self.opened_as)
     }
 }
 

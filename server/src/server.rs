@@ -7,7 +7,7 @@ use std::{future::Future, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
 
 use axum::Router;
 use hyper_util::server::graceful::GracefulShutdown;
-use tokio::{net::TcpListener, task::JoinSet};
+use tokio::{net::TcpListener, sync::watch, task::JoinSet};
 
 use crate::{
     config::ServeConfig,
@@ -52,7 +52,8 @@ impl Server {
         let limits = ConnectionLimits::from(&self.config);
         let graceful = GracefulShutdown::new();
         let mut connections = JoinSet::new();
-        let sweeping = tokio::spawn(self.site.sweep());
+        let (stop, stopping) = watch::channel(false);
+        let sweeping = tokio::spawn(Arc::clone(&self.site).sweep());
         let mut shutdown = pin!(shutdown);
         loop {
             tokio::select! {
@@ -63,9 +64,11 @@ impl Server {
                 {
                     match accepted {
                         Ok((stream, _)) => {
-                            let router = self.router.clone();
-                            let watcher = graceful.watcher();
-                            connections.spawn(connection::serve(stream, router, limits, watcher));
+                            let (site, router) = (Arc::clone(&self.site), self.router.clone());
+                            let (watcher, stopping) = (graceful.watcher(), stopping.clone());
+                            connections.spawn(connection::serve(
+                                stream, site, router, limits, watcher, stopping,
+                            ));
                         }
                         Err(e) => recover(&e).await,
                     }
@@ -73,6 +76,8 @@ impl Server {
             }
         }
         drop(self.listener);
+        // It fails only where nobody listens.
+        let _ = stop.send(true);
         let drained = async {
             graceful.shutdown().await;
             while connections.join_next().await.is_some() {}

@@ -45,6 +45,7 @@ impl Policy {
         // No payloads with the first bytes.
         let apart = EngineConfig {
             coalesce: Coalesce::NONE,
+            batches: false,
             paces: false,
             cancels: false,
             occlusion: false,

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use axum::{
     body::Body,
     extract::{DefaultBodyLimit, Path, RawQuery, State, rejection::BytesRejection},
-    http::{HeaderMap, HeaderValue, StatusCode, header},
+    http::{HeaderMap, StatusCode, header},
     response::Response,
     routing::{MethodRouter, post},
 };
@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// What the first answer about a dataset says of batches: the version, and the limits of a request.
-pub(super) const OFFER: HeaderValue = HeaderValue::from_static("1; parts=4096; bytes=67108864");
+pub(crate) const OFFER: &str = "1; parts=4096; bytes=67108864";
 
 /// `POST` of a batch request.
 pub(super) fn route() -> MethodRouter<Arc<Site>> {
@@ -107,6 +107,6 @@ mod tests {
     #[test]
     fn the_offer_tells_the_limits() {
         let limits = format!("1; parts={MAX_BATCH_PARTS}; bytes={MAX_BATCH_BYTES}");
-        assert_eq!(OFFER, limits.as_str());
+        assert_eq!(OFFER, limits);
     }
 }

@@ -23,10 +23,13 @@ use crate::{
     range::Selection,
 };
 
-/// Content never changes under the address that names it.
-const FOREVER: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
-/// Under its name, a dataset may be replaced.
-const A_MINUTE: HeaderValue = HeaderValue::from_static("public, max-age=60");
+/// How long what comes from an address may be kept. Content never changes under the address that names
+/// it; under its name, a dataset may be replaced.
+pub(crate) const fn cache_control(by_content: bool) -> &'static str {
+    if by_content { "public, max-age=31536000, immutable" } else { "public, max-age=60" }
+}
+
+const OFFER: HeaderValue = HeaderValue::from_static(batch::OFFER);
 const BYTES: HeaderValue = HeaderValue::from_static("bytes");
 const DATASET_TYPE: HeaderValue = HeaderValue::from_static(multipart::DATASET_TYPE);
 
@@ -64,9 +67,7 @@ pub(super) async fn open(
         let line = format!("no dataset file {file_name:?} here; /datasets lists all");
         Refusal::new(StatusCode::NOT_FOUND, line)
     };
-    let path = site.folder.path_of(file_name).ok_or_else(missing)?;
-    let opening = Arc::clone(site);
-    let file = match site.offload.run(move || opening.open_files.open(path)).await {
+    let file = match site.dataset(file_name).await.ok_or_else(missing)? {
         Ok(file) => file,
         Err(OpenError::Missing) => return Err(missing()),
         Err(OpenError::Unreadable(reason)) => {
@@ -94,7 +95,7 @@ fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> 
     }
     let mut response = Response::builder()
         .header(header::ETAG, &file.etag)
-        .header(header::CACHE_CONTROL, if by_content { FOREVER } else { A_MINUTE });
+        .header(header::CACHE_CONTROL, HeaderValue::from_static(cache_control(by_content)));
     if let Some(modified) = &file.last_modified {
         response = response.header(header::LAST_MODIFIED, modified);
     }
@@ -113,7 +114,7 @@ fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> 
     let pool = Arc::clone(&site.buffers);
     let (response, content_type, body) = match selection {
         Selection::Whole => {
-            let response = response.status(StatusCode::OK).header(BATCH_OFFER, batch::OFFER);
+            let response = response.status(StatusCode::OK).header(BATCH_OFFER, OFFER);
             (response, DATASET_TYPE, FileBody::new(file, 0..length, pool))
         }
         Selection::Part(range) => {
@@ -122,7 +123,7 @@ fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> 
                 response.status(StatusCode::PARTIAL_CONTENT).header(header::CONTENT_RANGE, content);
             // Whoever reads a dataset asks for its beginning first.
             if range.start == 0 {
-                response = response.header(BATCH_OFFER, batch::OFFER);
+                response = response.header(BATCH_OFFER, OFFER);
             }
             (response, DATASET_TYPE, FileBody::new(file, range, pool))
         }

@@ -29,11 +29,16 @@ use crate::{
     buffers::BufferPool,
     config::ServeConfig,
     error::Result,
+    file::{DatasetFile, OpenError},
     folder::Folder,
     index::{DatasetIndex, IndexCache},
     offload::Offload,
     open_files::{OpenFiles, SWEEP_INTERVAL},
+    private_copy::PrivateCopies,
 };
+
+pub(crate) use batch::OFFER as BATCH_OFFER;
+pub(crate) use dataset::cache_control;
 
 /// What all requests share.
 #[derive(Debug)]
@@ -41,7 +46,8 @@ pub(crate) struct Site {
     folder: Folder,
     index: IndexCache,
     open_files: OpenFiles,
-    buffers: Arc<BufferPool>,
+    pub(crate) buffers: Arc<BufferPool>,
+    pub(crate) private_copies: Arc<PrivateCopies>,
     offload: Offload,
 }
 
@@ -52,8 +58,19 @@ impl Site {
             index: IndexCache::default(),
             open_files: OpenFiles::default(),
             buffers: Arc::default(),
+            private_copies: Arc::default(),
             offload: Offload::new(),
         }))
+    }
+
+    /// The dataset's file; `None` where no dataset can be called that.
+    pub(crate) async fn dataset(
+        self: &Arc<Self>,
+        file_name: &str,
+    ) -> Option<Result<Arc<DatasetFile>, OpenError>> {
+        let path = self.folder.path_of(file_name)?;
+        let site = Arc::clone(self);
+        Some(self.offload.run(move || site.open_files.open(path)).await)
     }
 
     /// Lets go of files that nobody asks for any more, now and then; never ends.
@@ -93,6 +110,11 @@ pub(crate) fn router(site: Arc<Site>, response_timeout: Duration) -> Router {
         .layer(middleware::from_fn(options::options))
         .layer(middleware::from_fn(log_request))
 }
+
+/// What the CORS layer adds to every answer, for the answers that it does not see.
+pub(crate) const CROSS_ORIGIN_FIELDS: &str = "access-control-allow-origin: *\r\n\
+     access-control-expose-headers: lodestream-batch,accept-ranges,content-length,content-range,etag,\
+     last-modified\r\n";
 
 /// Datasets are public: any page may read them, and see the fields that range clients need.
 fn cross_origin() -> CorsLayer {

@@ -8,3 +8,4 @@ mod names;
 mod ranges;
 mod shutdown;
 mod support;
+mod two_ways;
