@@ -18,7 +18,11 @@ use std::{
 
 use bytes::BytesMut;
 use httpdate::HttpDate;
-use tokio::{net::TcpStream, sync::watch, time::timeout};
+use tokio::{
+    net::TcpStream,
+    sync::watch,
+    time::{Instant, timeout, timeout_at},
+};
 
 use self::head::{Head, RangeRequest};
 use crate::{
@@ -47,6 +51,9 @@ pub(crate) async fn serve(
     let mut bytes = BytesMut::new();
     let mut reply = Vec::new();
     loop {
+        // For the whole head, and for the pause before it: a client that sends a byte now and then does
+        // not get more.
+        let deadline = Instant::now() + limits.head_timeout;
         let (request, length) = loop {
             match head::read(&bytes) {
                 Head::Range(request, length) => break (request, length),
@@ -59,7 +66,7 @@ pub(crate) async fn serve(
                 // An idle connection holds no memory.
                 (bytes, reply) = (BytesMut::new(), Vec::new());
             }
-            let waiting = timeout(limits.head_timeout, stream.readable());
+            let waiting = timeout_at(deadline, stream.readable());
             let ready = tokio::select! {
                 biased;
                 ready = waiting => ready,

@@ -1,6 +1,7 @@
 //! What the server answers, one file per resource.
 
 mod batch;
+mod compressed;
 mod dataset;
 mod health;
 mod list;
@@ -36,6 +37,8 @@ use crate::{
     open_files::{OpenFiles, SWEEP_INTERVAL},
     private_copy::PrivateCopies,
 };
+
+use self::compressed::compressed;
 
 pub(crate) use batch::OFFER as BATCH_OFFER;
 pub(crate) use dataset::cache_control;
@@ -96,8 +99,8 @@ impl Site {
 /// All routes over a site.
 pub(crate) fn router(site: Arc<Site>, response_timeout: Duration) -> Router {
     Router::new()
-        .route("/", get(page::page))
-        .route("/datasets", get(list::list))
+        .route("/", compressed(get(page::page)))
+        .route("/datasets", compressed(get(list::list)))
         .route("/datasets/{file}", get(dataset::dataset))
         .route("/datasets/{file}/batch", batch::route())
         .route("/healthz", get(health::health))
