@@ -38,6 +38,20 @@ impl Client {
     /// # Errors
     /// Where not even the head of an answer comes.
     pub fn ask(&mut self, path: &str, first: u64, last: u64) -> io::Result<Answer> {
+        let head = self.begin(path, first, last)?;
+        let field = |name: &str| {
+            let value = head.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
+            value.unwrap_or_default().to_owned()
+        };
+        let status = head.split(' ').nth(1).and_then(|status| status.parse().ok());
+        let length: usize = field("content-length").parse().expect("a length");
+        let body = self.rest(length);
+        let is_whole = body.len() == length;
+        Ok(Answer { status: status.expect("a status"), etag: field("etag"), body, is_whole })
+    }
+
+    /// Asks for a range, and takes nothing of the answer but its head.
+    pub fn begin(&mut self, path: &str, first: u64, last: u64) -> io::Result<String> {
         let request =
             format!("GET {path} HTTP/1.1\r\nhost: x\r\nrange: bytes={first}-{last}\r\n\r\n");
         self.stream.write_all(request.as_bytes())?;
@@ -47,17 +61,15 @@ impl Client {
             self.stream.read_exact(&mut byte)?;
             head.push(byte[0]);
         }
-        let head = String::from_utf8(head).expect("ASCII");
-        let field = |name: &str| {
-            let value = head.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
-            value.unwrap_or_default().to_owned()
-        };
-        let status = head.split(' ').nth(1).and_then(|status| status.parse().ok());
-        let length: usize = field("content-length").parse().expect("a length");
+        Ok(String::from_utf8(head).expect("ASCII"))
+    }
+
+    /// So many bytes of the body, or as many as come.
+    pub fn rest(&mut self, length: usize) -> Vec<u8> {
         let mut body = Vec::with_capacity(length);
-        let read = (&mut self.stream).take(length as u64).read_to_end(&mut body);
-        let is_whole = read.is_ok() && body.len() == length;
-        Ok(Answer { status: status.expect("a status"), etag: field("etag"), body, is_whole })
+        // What came before an error is there.
+        let _ = (&mut self.stream).take(length as u64).read_to_end(&mut body);
+        body
     }
 }
 

@@ -80,3 +80,31 @@ fn a_file_that_is_cut_short_under_load_brings_no_wrong_byte_and_harms_no_other()
     crowd.tally.wait_for_good(20);
     crowd.stop();
 }
+
+#[test]
+fn what_waits_in_a_socket_is_not_blanked_by_a_cut() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = dataset(1, 2_000_000);
+    let path = folder.path().join("a.lods");
+    fs::write(&path, &file).expect("writable");
+    let server = serve(folder.path());
+    let mut client = Client::connect(server.addr()).expect("the server accepts");
+    // Long enough for the file to earn its private copy.
+    for _ in 0..60 {
+        assert!(client.ask("/a.lods", 0, 1_499_999).expect("an answer").is_whole);
+    }
+    let mut waiting: Vec<_> = (0..20)
+        .map(|_| {
+            let mut client = Client::connect(server.addr()).expect("the server accepts");
+            client.begin("/a.lods", 0, 199_999).expect("an answer begins");
+            client
+        })
+        .collect();
+    let cut = OpenOptions::new().write(true).open(&path).expect("it is there");
+    cut.set_len(100_001).expect("writable");
+    for client in &mut waiting {
+        let body = client.rest(200_000);
+        let at = body.iter().zip(&file).position(|(a, b)| a != b);
+        assert_eq!(at, None, "wrong from there on, of {} bytes", body.len());
+    }
+}
