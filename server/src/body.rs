@@ -2,27 +2,19 @@
 //!
 //! Pieces are read by position into recycled buffers. While the system has the bytes in its cache,
 //! that is done in place (`preadv2` with `RWF_NOWAIT`, which never waits for the disk); the rest
-//! goes to the blocking pool. The obvious other way, slices of a memory map, saves a copy, but
+//! goes to the blocking pool. Whatever was read counts only if the file is unchanged afterwards, so
+//! that a file which is cut short or written to is never sent as what it was. The obvious other way,
+//! slices of a memory map, saves a copy, but
 //!
 //! - a file that is cut short under a map ends the process (`SIGBUS`) as soon as anything in the
 //!   process touches the bytes; here it is one broken response;
 //! - bytes that are not cached are page faults, which block a runtime thread each, step by step;
 //! - a map counts as memory of the process; this server stays at 10 MB.
 //!
-//! Measured with `wrk` (64 KiB ranges at random places; loopback; two cores, shared with other
-//! work) in alternating runs. Hot: 16 connections, file in the cache, the server's processor time
-//! per request. Cold: 32 connections, 3 GB just evicted from the cache.
-//!
-//! | body | hot | cold |
-//! | --- | --- | --- |
-//! | slices of a memory map | 32-36 µs | 31 MB/s |
-//! | these reads | 32-44 µs | 240-430 MB/s |
-//! | reads on the blocking pool only | 65-79 µs | 400-530 MB/s |
-//! | tower-http `ServeDir` | 210-270 µs | |
-//! | nginx 1.22 (`sendfile`) | 33-35 µs | 110-170 MB/s |
-//!
-//! The whole server, routing and all, took 42-48 µs beside nginx's 26-30 in later runs, and
-//! answered 0.8 to 1.05 times as many hot, twice as many cold requests.
+//! Where a dataset is asked for much, plain ranges are sent without any copy: see
+//! [`private_copy`](crate::private_copy). Cold, with 32 connections, ranges of 64 KiB at random places and
+//! 3 GB just evicted from the cache, these reads bring 240-430 MB/s, slices of a map 31, nginx 1.22
+//! 110-170 (`wrk`, loopback, two cores shared with other work).
 
 use std::{
     future::poll_fn,
@@ -270,4 +262,82 @@ fn read_cached(file: &DatasetFile, buffer: &mut [u8], offset: u64) -> io::Result
 #[cfg(not(target_os = "linux"))]
 fn read_cached(_: &DatasetFile, _: &mut [u8], _: u64) -> io::Result<usize> {
     Err(io::ErrorKind::WouldBlock.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::{File, OpenOptions};
+
+    use lodestream_preprocess::FileSource;
+    use lodestream_protocol::Header;
+
+    /// A file of 64 KiB of ones behind a header.
+    fn dataset(folder: &tempfile::TempDir) -> DatasetFile {
+        let header = Header {
+            version: (1, 0),
+            manifest_bytes: 0,
+            root_page_bytes: 0,
+            boot_bytes: 64,
+            file_bytes: 64 << 10,
+            content_id: [7; 16],
+            index_crc: 0,
+        };
+        let mut bytes = header.encode().to_vec();
+        bytes.resize(64 << 10, 1);
+        let path = folder.path().join("a.lods");
+        std::fs::write(&path, bytes).expect("writable");
+        DatasetFile::open(path).expect("a dataset").1
+    }
+
+    fn body(file: DatasetFile, segments: Vec<Segment>) -> FileBody {
+        FileBody::of(Arc::new(file), segments, Arc::default())
+    }
+
+    #[tokio::test]
+    async fn a_disk_that_fails_breaks_the_response_off() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut file = dataset(&folder);
+        // A file that was opened for writing alone: every read fails, as of a disk that is broken.
+        let unreadable = OpenOptions::new().write(true).open(&file.path).expect("writable");
+        file.source = FileSource::from(unreadable);
+        let mut body = body(file, vec![Segment::File(0..100)]);
+        assert!(body.next().await.expect("an end").is_err());
+        assert!(body.next().await.is_none());
+    }
+
+    #[tokio::test]
+    async fn bytes_of_a_file_that_was_changed_are_not_sent() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = dataset(&folder);
+        let path = file.path.clone();
+        let mut body = body(file, vec![Segment::File(0..100)]);
+        let cut = |length| {
+            let file = OpenOptions::new().write(true).open(&path);
+            file.and_then(|file: File| file.set_len(length)).expect("writable");
+        };
+        // As long as it was, but blank in between.
+        cut(50);
+        cut(64 << 10);
+        assert!(body.next().await.expect("an end").is_err());
+    }
+
+    #[tokio::test]
+    async fn segments_come_one_after_the_other_whatever_their_lengths() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = dataset(&folder);
+        let text = |text: &'static str| Segment::Text(Bytes::from_static(text.as_bytes()));
+        let mut segments = vec![text("begin"), Segment::File(64..64), text("")];
+        segments.extend((0..10).map(|_| Segment::File(64..64 << 10)));
+        segments.push(text("end"));
+        let mut body = body(file, segments);
+        let (announced, mut bytes, mut pieces) = (body.left(), Vec::new(), 0);
+        while let Some(piece) = body.next().await {
+            bytes.extend_from_slice(piece.expect("readable").as_ref());
+            pieces += 1;
+        }
+        let ones = vec![1; 10 * ((64 << 10) - 64)];
+        assert!(bytes == [&b"begin"[..], &ones, b"end"].concat());
+        assert_eq!((announced, pieces), (bytes.len() as u64, 3));
+    }
 }

@@ -16,7 +16,7 @@ use axum::{
 };
 use bytes::{Bytes, BytesMut};
 use lodestream_protocol::{
-    BATCH_HEAD_BYTES, BATCH_REQUEST_TYPE, BATCH_TYPE, BatchRequest, FRAME_HEAD_BYTES,
+    BATCH_HEAD_BYTES, BATCH_REQUEST_TYPE, BATCH_TYPE, BatchPart, BatchRequest, FRAME_HEAD_BYTES,
     MAX_BATCH_REQUEST_BYTES, batch_head, frame_head,
 };
 
@@ -68,10 +68,7 @@ fn answer(
         let line = "the dataset is not the one asked for: it was replaced".to_owned();
         return Err((StatusCode::PRECONDITION_FAILED, line));
     }
-    let is_beyond = |part: &lodestream_protocol::BatchPart| {
-        part.offset.checked_add(u64::from(part.bytes)).is_none_or(|end| end > file.bytes)
-    };
-    if let Some(index) = request.parts.iter().position(is_beyond) {
+    if let Some(index) = reaches_beyond(request, &file) {
         let line = format!("part {index} reaches beyond the dataset's {} bytes", file.bytes);
         return Err((StatusCode::RANGE_NOT_SATISFIABLE, line));
     }
@@ -83,7 +80,14 @@ fn answer(
     Ok(finish(response, Body::new(body)))
 }
 
-fn segments(request: &BatchRequest) -> Vec<Segment> {
+/// The first part that is not within the file.
+pub(crate) fn reaches_beyond(request: &BatchRequest, file: &DatasetFile) -> Option<usize> {
+    let end = |part: &BatchPart| part.offset.checked_add(u64::from(part.bytes));
+    request.parts.iter().position(|part| end(part).is_none_or(|end| end > file.bytes))
+}
+
+/// The response's body.
+pub(crate) fn segments(request: &BatchRequest) -> Vec<Segment> {
     let count = request.parts.len();
     // All heads lie in one piece of memory.
     let mut heads = BytesMut::with_capacity(BATCH_HEAD_BYTES + FRAME_HEAD_BYTES * count);

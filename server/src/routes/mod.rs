@@ -40,7 +40,7 @@ use crate::{
 
 use self::compressed::compressed;
 
-pub(crate) use batch::OFFER as BATCH_OFFER;
+pub(crate) use batch::{OFFER as BATCH_OFFER, reaches_beyond, segments as batch_segments};
 pub(crate) use dataset::cache_control;
 
 /// What all requests share.
@@ -64,6 +64,12 @@ impl Site {
             private_copies: Arc::default(),
             offload: Offload::new(),
         }))
+    }
+
+    /// Whether plain ranges may go the short way, past all layers: only where none of them has
+    /// anything to do with a request.
+    pub(crate) fn has_short_way(&self) -> bool {
+        !tracing::enabled!(tracing::Level::DEBUG)
     }
 
     /// The dataset's file; `None` where no dataset can be called that.

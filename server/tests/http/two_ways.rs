@@ -5,6 +5,8 @@ use std::{
     net::TcpStream,
 };
 
+use lodestream_protocol::{BATCH_REQUEST_TYPE, BatchPart, BatchRequest, Header};
+
 use crate::support::{Site, dataset};
 
 /// Head and body of the answer to a `GET`, on a connection that stays open.
@@ -53,6 +55,32 @@ async fn both_ways_give_the_same_answer() {
         let range = "range: bytes=0-9\r\n";
         let quick = ask(&mut connect(), path, range);
         assert_eq!(quick, ask(&mut connect(), path, &format!("{range}x-other: 1\r\n")), "{path}");
+    }
+}
+
+#[test]
+fn both_ways_give_the_same_batch() {
+    let (site, bytes) = Site::with_dataset();
+    let content_id = Header::parse(&bytes).expect("a sound header").content_id;
+    let connect = || TcpStream::connect(site.server.addr()).expect("the server accepts");
+    let (mut short, mut long) = (connect(), connect());
+    for round in 0..30u64 {
+        // Some of them too short for pages, and some too long for a piece.
+        let places = [(round * 1000, 10), (600_000, 90_000), (round, 5_000 * round as u32 + 1)];
+        let parts = places.map(|(offset, bytes)| BatchPart { offset, bytes }).to_vec();
+        let body = BatchRequest { content_id, parts }.encode().expect("within the limits");
+        let post = |stream: &mut TcpStream, other: &str| {
+            let head = format!(
+                "POST /a.lods/batch HTTP/1.1\r\nhost: x\r\ncontent-type: {BATCH_REQUEST_TYPE}\r\n\
+                 content-length: {}\r\n{other}\r\n",
+                body.len()
+            );
+            stream.write_all(&[head.as_bytes(), &body].concat()).expect("the server reads");
+            answer(stream)
+        };
+        let quick = post(&mut short, "");
+        assert!(quick == post(&mut long, "x-other: 1\r\n"), "{round}: {:?}", quick.0);
+        assert_eq!(quick.1.len(), 24 + 3 * 8 + 90_011 + 5_000 * round as usize);
     }
 }
 
