@@ -11,13 +11,16 @@ use axum::http::HeaderValue;
 use lodestream_preprocess::FileSource;
 use lodestream_protocol::{Error as FormatError, HEADER_BYTES, Header};
 
-use crate::conditional::{Validators, http_date};
+use crate::{
+    conditional::{Validators, http_date},
+    storage::{Object, Source},
+};
 
 /// An open file whose header is sound and which is as long as its header says.
 #[derive(Debug)]
 pub(crate) struct DatasetFile {
     pub(crate) path: PathBuf,
-    pub(crate) source: FileSource,
+    pub(crate) source: Source,
     /// Length of the dataset in bytes; what the file may hold beyond it is not served.
     pub(crate) bytes: u64,
     /// Identity of the content.
@@ -53,7 +56,7 @@ impl Identity {
 }
 
 /// Why a dataset file cannot be served.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum OpenError {
     /// There is no such file.
     Missing,
@@ -77,11 +80,28 @@ impl DatasetFile {
                 available: length,
             }));
         }
+        let file = Self::sound(path, Source::File(source), &header, metadata.modified().ok())?;
+        Ok((Identity::of(&metadata), file))
+    }
+
+    /// A dataset of an object store.
+    pub(crate) fn of_object(object: Object) -> Result<Self, OpenError> {
+        let (path, modified) = (PathBuf::from(object.name()), object.modified());
+        let header = *object.header();
+        Self::sound(path, Source::Object(object), &header, Some(modified))
+    }
+
+    fn sound(
+        path: PathBuf,
+        source: Source,
+        header: &Header,
+        modified: Option<SystemTime>,
+    ) -> Result<Self, OpenError> {
         let validators = Validators {
             etag: format!("\"{}\"", header.content_id_hex()),
-            modified: metadata.modified().ok().and_then(|m| http_date(m, SystemTime::now())),
+            modified: modified.and_then(|modified| http_date(modified, SystemTime::now())),
         };
-        let file = Self {
+        Ok(Self {
             path,
             source,
             bytes: header.file_bytes,
@@ -89,8 +109,7 @@ impl DatasetFile {
             etag: HeaderValue::from_str(&validators.etag).map_err(unreadable)?,
             last_modified: validators.modified.and_then(|m| m.to_string().try_into().ok()),
             validators,
-        };
-        Ok((Identity::of(&metadata), file))
+        })
     }
 }
 

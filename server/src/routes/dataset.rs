@@ -14,7 +14,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::{Refusal, Site, batch};
+use super::{Refusal, Site, batch, missing};
 use crate::{
     body::FileBody,
     conditional::Verdict,
@@ -54,21 +54,22 @@ pub(super) struct Opened {
     by_content: bool,
 }
 
+impl Opened {
+    /// How long what comes from this address may be kept.
+    pub(super) const fn cache_control(&self) -> HeaderValue {
+        if self.by_content { FOREVER } else { A_MINUTE }
+    }
+}
+
 /// Opens the dataset of that name.
 pub(super) async fn open(
     site: &Arc<Site>,
     file_name: &str,
     query: Option<&str>,
 ) -> Result<Opened, Refusal> {
-    let missing = || {
-        let line = format!("no dataset file {file_name:?} here; /datasets lists all");
-        Refusal::new(StatusCode::NOT_FOUND, line)
-    };
-    let path = site.folder.path_of(file_name).ok_or_else(missing)?;
-    let opening = Arc::clone(site);
-    let file = match site.offload.run(move || opening.open_files.open(path)).await {
+    let file = match site.storage.dataset(file_name, &site.offload).await {
         Ok(file) => file,
-        Err(OpenError::Missing) => return Err(missing()),
+        Err(OpenError::Missing) => return Err(missing(file_name)),
         Err(OpenError::Unreadable(reason)) => {
             tracing::warn!("{file_name}: {reason}");
             // It may be on its way into the folder: worth another try.
@@ -85,7 +86,8 @@ pub(super) async fn open(
 }
 
 fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> Response {
-    let Opened { file, by_content } = opened;
+    let cache_control = opened.cache_control();
+    let file = opened.file;
     let length = file.bytes;
     let verdict = file.validators.judge(headers);
     if verdict == Verdict::Failed {
@@ -94,7 +96,7 @@ fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> 
     }
     let mut response = Response::builder()
         .header(header::ETAG, &file.etag)
-        .header(header::CACHE_CONTROL, if by_content { FOREVER } else { A_MINUTE });
+        .header(header::CACHE_CONTROL, cache_control);
     if let Some(modified) = &file.last_modified {
         response = response.header(header::LAST_MODIFIED, modified);
     }
