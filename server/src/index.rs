@@ -121,8 +121,11 @@ impl IndexCache {
         let mut entries = self.entries.lock().await;
         let listing = storage.list().await?;
         let known = std::mem::take(&mut *entries);
-        let unknown = listing.datasets.iter().filter(|name| !known.contains_key(*name)).cloned();
-        storage.warm(&unknown.collect::<Vec<_>>()).await;
+        let is_still = |name: &&String| {
+            known.get(*name).is_some_and(|known| listing.is_still(name, &known.identity))
+        };
+        let new: Vec<_> = listing.datasets.iter().filter(|name| !is_still(name)).cloned().collect();
+        storage.warm(&new).await;
         let storage = Arc::clone(storage);
         let looking = tokio::task::spawn_blocking(move || look(&storage, &listing, known));
         let (index, known) = looking.await.map_err(io::Error::other)?;
@@ -160,7 +163,7 @@ fn look_at(
     file_name: &str,
     known: Option<Known>,
 ) -> Result<Known, OpenError> {
-    let known = known.filter(|known| storage.is_still(file_name, &known.identity));
+    let known = known.filter(|known| storage.is_still(listing, file_name, &known.identity));
     let mut found = match known {
         Some(known) => known,
         None => {

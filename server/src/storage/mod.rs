@@ -11,7 +11,12 @@ mod objects;
 mod small;
 mod source;
 
-use std::{collections::HashSet, io, sync::Arc, time::SystemTime};
+use std::{
+    collections::{HashMap, HashSet},
+    io,
+    sync::Arc,
+    time::SystemTime,
+};
 
 use lodestream_preprocess::preview::{PREVIEW_SUFFIX, preview_content_id, preview_path};
 
@@ -45,14 +50,8 @@ pub(crate) enum Storage {
 pub(crate) enum Identity {
     /// Of a folder.
     File(FileIdentity),
-    /// Of an object store.
-    Object {
-        /// Length in bytes.
-        length: u64,
-        modified: SystemTime,
-        /// The store's entity tag, where it has such.
-        tag: Option<String>,
-    },
+    /// Of an object store, by its length and what else tells versions apart there.
+    Object(u64, Version),
 }
 
 /// Names of files.
@@ -60,6 +59,8 @@ pub(crate) enum Identity {
 pub(crate) struct Listing {
     /// Those that may be datasets, sorted.
     pub(crate) datasets: Vec<String>,
+    /// What they are, where the list tells that: an object store's does.
+    identities: HashMap<String, Identity>,
     previews: HashSet<String>,
 }
 
@@ -77,6 +78,11 @@ impl Listing {
         listing
     }
 
+    /// Whether the list itself says that a name leads to what was looked at.
+    pub(crate) fn is_still(&self, file_name: &str, known: &Identity) -> bool {
+        self.identities.get(file_name) == Some(known)
+    }
+
     /// Whether a picture lies beside the dataset.
     pub(crate) fn has_preview(&self, file_name: &str) -> bool {
         self.previews.contains(&beside(file_name))
@@ -86,6 +92,15 @@ impl Listing {
 /// The name of the picture that lies beside a dataset.
 fn beside(file_name: &str) -> String {
     preview_path(file_name.as_ref()).display().to_string()
+}
+
+/// What tells versions of an object apart.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Version {
+    /// The store's entity tag.
+    Tag(String),
+    /// Where it has none: when it was written.
+    Written(SystemTime),
 }
 
 /// A dataset whose index can be read.
@@ -128,14 +143,13 @@ impl Storage {
     }
 
     /// Whether a name still leads to what was looked at (blocking).
-    pub(crate) fn is_still(&self, file_name: &str, known: &Identity) -> bool {
+    pub(crate) fn is_still(&self, listing: &Listing, file_name: &str, known: &Identity) -> bool {
         match self {
             Self::Folder(folder, _) => {
                 let metadata = folder.path_of(file_name).and_then(|path| path.metadata().ok());
                 metadata.is_some_and(|m| Identity::File(FileIdentity::of(&m)) == *known)
             }
-            // What was just listed or looked at tells.
-            Self::Objects(objects) => objects.looked_at(file_name).as_ref() == Some(known),
+            Self::Objects(_) => listing.is_still(file_name, known),
         }
     }
 

@@ -7,7 +7,7 @@ use lodestream_protocol::{Error as FormatError, Header, ReadAt, Result as Format
 use object_store::{GetOptions, GetRange, ObjectMeta, path::Path};
 use tokio::runtime::Handle;
 
-use super::{Identity, Objects, blocks::BLOCK_BYTES};
+use super::{Identity, Objects, Version, blocks::BLOCK_BYTES};
 
 /// A dataset of the store. Reads fail once the store has other bytes under its name.
 #[derive(Debug, Clone)]
@@ -44,11 +44,9 @@ pub(super) fn ask_same(meta: &ObjectMeta, range: Range<u64>) -> GetOptions {
 
 impl Identity {
     pub(super) fn of_object(meta: &ObjectMeta) -> Self {
-        Self::Object {
-            length: meta.size,
-            modified: SystemTime::from(meta.last_modified),
-            tag: meta.e_tag.clone(),
-        }
+        // A list may tell times more finely than an answer does: a tag is enough.
+        let written = || Version::Written(SystemTime::from(meta.last_modified));
+        Self::Object(meta.size, meta.e_tag.clone().map_or_else(written, Version::Tag))
     }
 }
 

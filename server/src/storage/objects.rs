@@ -97,7 +97,11 @@ impl Objects {
         }
         let answer = self.request(self.store.list_with_delimiter(Some(&self.prefix))).await?;
         let names = answer.objects.iter().filter_map(|meta| meta.location.filename());
-        let found = Listing::of(names.map(str::to_owned).collect());
+        let mut found = Listing::of(names.map(str::to_owned).collect());
+        for meta in &answer.objects {
+            let name = meta.location.filename().unwrap_or_default().to_owned();
+            found.identities.insert(name, Identity::of_object(meta));
+        }
         *listed = Some((Instant::now(), found.clone()));
         Ok(found)
     }
@@ -118,19 +122,12 @@ impl Objects {
         while tasks.join_next().await.is_some() {}
     }
 
-    /// What the name leads to, as far as that was looked at a moment ago.
-    pub(super) fn looked_at(&self, file_name: &str) -> Option<Identity> {
-        let known = self.known.get(file_name).filter(|known| known.at.elapsed() < FRESH)?;
-        known.state.ok().map(|state| Identity::of_object(&state.meta))
-    }
-
     /// The dataset of that file name.
     pub(crate) async fn dataset(
         self: &Arc<Self>,
         file_name: &str,
     ) -> std::result::Result<Object, OpenError> {
-        let is_stale = |_: &String, known: &Known| known.at.elapsed() >= FRESH;
-        let former = self.known.remove_if(file_name, |known| is_stale(&String::new(), known));
+        let former = self.known.remove_if(file_name, |known| known.at.elapsed() >= FRESH);
         let known = match self.known.get_value_or_guard_async(file_name).await {
             Ok(known) => known,
             Err(guard) => {

@@ -6,6 +6,8 @@ use std::{
     process::Command,
 };
 
+use rustix::process::Signal;
+
 use crate::{process::Process, server};
 
 fn shipped(name: &str) -> PathBuf {
@@ -128,9 +130,7 @@ async fn rules_are_read_again_at_a_hangup_and_tokens_stay_out_of_the_log() {
     let dataset = format!("{url}/datasets/a.lods");
     assert_eq!(status(&dataset).await, 404);
     config("a");
-    let pid = process.id().to_string();
-    let sent = Command::new("kill").args(["-HUP", &pid]).status().expect("kill runs");
-    assert!(sent.success());
+    process.signal(Signal::HUP);
     while status(&dataset).await != 200 {
         tokio::task::yield_now().await;
     }
@@ -143,10 +143,9 @@ async fn rules_are_read_again_at_a_hangup_and_tokens_stay_out_of_the_log() {
     let signature = link.rsplit_once('=').expect("signed").1;
     // A bad configuration changes nothing.
     fs::write(place("config.toml"), "nonsense").expect("writable");
-    Command::new("kill").args(["-HUP", &pid]).status().expect("kill runs");
+    process.signal(Signal::HUP);
     assert_eq!(status(&dataset).await, 200);
-    let ended = Command::new("kill").args(["-TERM", &pid]).status().expect("kill runs");
-    assert!(ended.success());
+    process.signal(Signal::TERM);
     process.wait();
     let log = fs::read_to_string(place("log")).expect("written");
     for line in log.lines() {

@@ -9,6 +9,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use rustix::process::{Pid, Signal, kill_process};
+
 /// A running nginx; ended when dropped.
 pub struct Nginx {
     pub addr: SocketAddr,
@@ -71,8 +73,7 @@ impl Nginx {
 impl Drop for Nginx {
     fn drop(&mut self) {
         // Its own way to stop: the master ends its workers, then itself.
-        let stopped = Command::new("kill").args(["-TERM", &self.child.id().to_string()]).status();
-        if !stopped.is_ok_and(|status| status.success()) {
+        if kill_process(Pid::from_child(&self.child), Signal::TERM).is_err() {
             let _ = self.child.kill();
         }
         let _ = self.child.wait();

@@ -10,8 +10,7 @@ use crate::{
 };
 
 const DESK: Look = Look { width: 1280, height: 1000, is_dark: false, has_scripts: true };
-/// As narrow as Chromium's windows get.
-const PHONE: Look = Look { width: 500, height: 1400, ..DESK };
+const PHONE: Look = Look { width: 390, height: 1400, ..DESK };
 
 /// The colour of most pixels.
 fn ground(picture: &RgbaImage) -> [u8; 3] {
@@ -54,8 +53,8 @@ fn the_page_is_readable_on_a_desk_and_on_a_phone_by_day_and_by_night_without_scr
     let without = look("no-scripts.png", Look { has_scripts: false, ..DESK });
     assert!(without == day, "scripts make a difference; see {}", pictures.display());
 
-    // Nothing sticks out: a page in a frame of a phone's width is not wider than the frame, which
-    // the frame's own page says. (Chromium's windows are no narrower than 500 pixels.)
+    // Nothing sticks out: in a frame as narrow as the narrowest phone, the page is as wide as the
+    // frame, which the page around it says.
     let probe = data.path().join("probe.html");
     let page = text_of(&url).replace("<img src=\"", &format!("<img src=\"{url}/"));
     fs::write(data.path().join("page.html"), page).expect("writable");

@@ -6,6 +6,8 @@ use std::{
     thread,
 };
 
+use rustix::process::{Pid, Signal, kill_process};
+
 /// Killed when dropped, unless it has ended.
 pub struct Process {
     child: Child,
@@ -44,8 +46,14 @@ impl Process {
         (process, found)
     }
 
-    pub fn id(&self) -> u32 {
-        self.child.id()
+    /// Sends it a signal.
+    pub fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.child), signal).expect("it runs");
+    }
+
+    /// Whether it still runs.
+    pub fn is_running(&mut self) -> bool {
+        self.child.try_wait().is_ok_and(|ended| ended.is_none())
     }
 
     /// Waits for its end.

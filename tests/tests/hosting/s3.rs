@@ -1,6 +1,10 @@
 //! An S3 server: `moto`'s, a program in Python, in an environment of its own.
 
-use std::process::Command;
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+    sync::OnceLock,
+};
 
 use lodestream_tests::python_environment;
 use reqwest::{Client, Method, StatusCode};
@@ -13,16 +17,23 @@ pub struct S3 {
     _process: Process,
 }
 
+/// One for all tests of this process: two must not make the environment at once.
+fn interpreter() -> &'static Path {
+    static INTERPRETER: OnceLock<PathBuf> = OnceLock::new();
+    INTERPRETER.get_or_init(|| {
+        python_environment("s3", "requirements-s3.txt").unwrap_or_else(|why| {
+            panic!("an S3 server is installed from tests/python/requirements-s3.txt: {why}")
+        })
+    })
+}
+
 /// Any; it does not look at signatures, but wants to see one.
 const SIGNED: &str = "AWS4-HMAC-SHA256 Credential=key/20260101/us-east-1/s3/aws4_request, \
                       SignedHeaders=host, Signature=none";
 
 impl S3 {
     pub async fn start() -> Self {
-        let python = python_environment("s3", "requirements-s3.txt").unwrap_or_else(|why| {
-            panic!("an S3 server is installed from tests/python/requirements-s3.txt: {why}")
-        });
-        let mut command = Command::new(python);
+        let mut command = Command::new(interpreter());
         command.args(["-u", "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"]);
         let (process, endpoint) = Process::start(command, true, |line| {
             line.split_once("Running on ").map(|(_, url)| url.trim().to_owned())
