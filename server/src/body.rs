@@ -157,7 +157,7 @@ impl Rest {
         &mut self,
         buffer: &mut Buffer,
         wanted: usize,
-        read: impl Fn(&DatasetFile, &mut [u8], u64) -> io::Result<usize>,
+        read: impl Fn(&DatasetFile, &mut [u8], Range<u64>) -> io::Result<usize>,
     ) -> io::Result<()> {
         while buffer.filled < wanted {
             let room = &mut buffer.bytes[buffer.filled..wanted];
@@ -170,7 +170,7 @@ impl Rest {
                 Segment::File(range) if !range.is_empty() => {
                     let left = usize::try_from(range.end - range.start).unwrap_or(usize::MAX);
                     let count = left.min(room.len());
-                    let count = read(&self.file, &mut room[..count], range.start)?;
+                    let count = read(&self.file, &mut room[..count], range.clone())?;
                     range.start += count as u64;
                     buffer.filled += count;
                 }
@@ -236,11 +236,11 @@ impl Body for FileBody {
     }
 }
 
-/// Reads some bytes, waiting for the disk; at least one.
-fn read_waiting(file: &DatasetFile, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
-    match file.source.read_into(buffer, offset)? {
+/// Reads some bytes from the start of `rest` on, waiting for the disk; at least one.
+fn read_waiting(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::Result<usize> {
+    match file.source.read(buffer, &rest)? {
         0 => {
-            let message = format!("the file was cut short to {offset} bytes");
+            let message = format!("the file was cut short to {} bytes", rest.start);
             Err(io::Error::new(io::ErrorKind::UnexpectedEof, message))
         }
         count => Ok(count),
@@ -249,19 +249,11 @@ fn read_waiting(file: &DatasetFile, buffer: &mut [u8], offset: u64) -> io::Resul
 
 /// Reads some bytes that can be had without waiting for the disk; at least one. Where the file system
 /// cannot tell, there are none.
-#[cfg(target_os = "linux")]
-fn read_cached(file: &DatasetFile, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
-    use rustix::io::{ReadWriteFlags, preadv2};
-    let rest = &mut [io::IoSliceMut::new(buffer)];
-    match preadv2(file.source.file(), rest, offset, ReadWriteFlags::NOWAIT)? {
+fn read_cached(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::Result<usize> {
+    match file.source.read_cached(buffer, rest.start)? {
         0 => Err(io::ErrorKind::WouldBlock.into()),
         count => Ok(count),
     }
-}
-
-#[cfg(not(target_os = "linux"))]
-fn read_cached(_: &DatasetFile, _: &mut [u8], _: u64) -> io::Result<usize> {
-    Err(io::ErrorKind::WouldBlock.into())
 }
 
 #[cfg(test)]
@@ -271,6 +263,8 @@ mod tests {
 
     use lodestream_preprocess::FileSource;
     use lodestream_protocol::Header;
+
+    use crate::storage::Source;
 
     /// A file of 64 KiB of ones behind a header.
     fn dataset(folder: &tempfile::TempDir) -> DatasetFile {
@@ -300,7 +294,7 @@ mod tests {
         let mut file = dataset(&folder);
         // A file that was opened for writing alone: every read fails, as of a disk that is broken.
         let unreadable = OpenOptions::new().write(true).open(&file.path).expect("writable");
-        file.source = FileSource::from(unreadable);
+        file.source = Source::File(FileSource::from(unreadable));
         let mut body = body(file, vec![Segment::File(0..100)]);
         assert!(body.next().await.expect("an end").is_err());
         assert!(body.next().await.is_none());

@@ -14,13 +14,14 @@ use lodestream_protocol::{Error as FormatError, HEADER_BYTES, Header};
 use crate::{
     conditional::{Validators, http_date},
     private_copy::CopyState,
+    storage::{Object, Source},
 };
 
 /// An open file whose header is sound and which is as long as its header says.
 #[derive(Debug)]
 pub(crate) struct DatasetFile {
     pub(crate) path: PathBuf,
-    pub(crate) source: FileSource,
+    pub(crate) source: Source,
     /// Length of the dataset in bytes; what the file may hold beyond it is not served.
     pub(crate) bytes: u64,
     /// Identity of the content.
@@ -31,8 +32,8 @@ pub(crate) struct DatasetFile {
     /// The modification time as a response carries it.
     pub(crate) last_modified: Option<HeaderValue>,
     pub(crate) private_copy: CopyState,
-    /// Length and modification time when it was opened.
-    opened_as: (u64, Option<SystemTime>),
+    /// Length and modification time when it was opened, of a file of this machine.
+    opened_as: Option<(u64, Option<SystemTime>)>,
 }
 
 /// Tells whether a path still leads to the file that was looked at.
@@ -59,7 +60,7 @@ impl Identity {
 }
 
 /// Why a dataset file cannot be served.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum OpenError {
     /// There is no such file.
     Missing,
@@ -83,11 +84,30 @@ impl DatasetFile {
                 available: length,
             }));
         }
+        let modified = metadata.modified().ok();
+        let mut file = Self::sound(path, Source::File(source), &header, modified)?;
+        file.opened_as = Some((length, modified));
+        Ok((Identity::of(&metadata), file))
+    }
+
+    /// A dataset of an object store.
+    pub(crate) fn of_object(object: Object) -> Result<Self, OpenError> {
+        let (path, modified) = (PathBuf::from(object.name()), object.modified());
+        let header = *object.header();
+        Self::sound(path, Source::Object(object), &header, Some(modified))
+    }
+
+    fn sound(
+        path: PathBuf,
+        source: Source,
+        header: &Header,
+        modified: Option<SystemTime>,
+    ) -> Result<Self, OpenError> {
         let validators = Validators {
             etag: format!("\"{}\"", header.content_id_hex()),
-            modified: metadata.modified().ok().and_then(|m| http_date(m, SystemTime::now())),
+            modified: modified.and_then(|modified| http_date(modified, SystemTime::now())),
         };
-        let file = Self {
+        Ok(Self {
             path,
             source,
             bytes: header.file_bytes,
@@ -95,17 +115,18 @@ impl DatasetFile {
             etag: HeaderValue::from_str(&validators.etag).map_err(unreadable)?,
             last_modified: validators.modified.and_then(|m| m.to_string().try_into().ok()),
             private_copy: CopyState::default(),
-            opened_as: (length, metadata.modified().ok()),
+            opened_as: None,
             validators,
-        };
-        Ok((Identity::of(&metadata), file))
+        })
     }
 
     /// Whether nobody has cut the file short or written to it since it was opened. Asked after bytes
-    /// were read: they are those of the dataset then, as a file is shorter before its bytes are gone.
+    /// were read: they are those of the dataset then, as a file is shorter before its bytes are gone. (An
+    /// object is asked for by its tag.)
     pub(crate) fn is_unchanged(&self) -> bool {
-        let metadata = self.source.file().metadata();
-        metadata.is_ok_and(|now| (now.len(), now.modified().ok()) == self.opened_as)
+        let Source::File(file) = &self.source else { return true };
+        let metadata = file.file().metadata();
+        metadata.is_ok_and(|now| Some((now.len(), now.modified().ok())) == self.opened_as)
     }
 }
 

@@ -23,7 +23,7 @@ use std::{
 
 use tokio::net::TcpStream;
 
-use crate::file::DatasetFile;
+use crate::{file::DatasetFile, storage::Source};
 
 /// Most bytes of all copies together.
 const MAX_COPIED_BYTES: u64 = 1 << 30;
@@ -99,6 +99,9 @@ pub(crate) fn count(file: &Arc<DatasetFile>, bytes: u64, copies: &Arc<PrivateCop
 
 impl PrivateCopy {
     fn of(source: &DatasetFile, copies: Arc<PrivateCopies>) -> io::Result<Self> {
+        let Source::File(original) = &source.source else {
+            return Err(io::Error::other("it comes from an object store"));
+        };
         let bytes = source.bytes;
         let take = |left: u64| left.checked_sub(bytes);
         copies
@@ -118,7 +121,7 @@ impl PrivateCopy {
         let mut offset = 0;
         while offset < bytes {
             let wanted = usize::try_from(bytes - offset).unwrap_or(CHUNK_BYTES).min(CHUNK_BYTES);
-            if source.source.read_into(&mut chunk[..wanted], offset)? < wanted {
+            if original.read_into(&mut chunk[..wanted], offset)? < wanted {
                 return Err(io::ErrorKind::UnexpectedEof.into());
             }
             copy.file.write_all(&chunk[..wanted])?;

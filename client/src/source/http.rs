@@ -23,7 +23,7 @@ use reqwest::{
     header::{self, HeaderMap},
 };
 
-use super::{Announced, BatchLimits, SourceError};
+use super::{Announced, BatchLimits, SourceError, token::authorization};
 
 /// How long a host may be silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,6 +115,10 @@ impl HttpSource {
             .tcp_nodelay(true)
             .connect_timeout(timeouts.connect)
             .read_timeout(timeouts.silence);
+        if let Some(token) = authorization() {
+            builder =
+                builder.default_headers([(header::AUTHORIZATION, token)].into_iter().collect());
+        }
         if is_loopback(&url) {
             builder = builder.no_proxy();
         }
@@ -349,9 +353,9 @@ impl HttpSource {
                 ask.offset,
                 ask.offset + ask.len
             )),
-            StatusCode::NOT_FOUND | StatusCode::GONE => {
-                self.permanent(format!("not found ({status}); check the address"))
-            }
+            StatusCode::NOT_FOUND | StatusCode::GONE => self.permanent(format!(
+                "not found ({status}); check the address, and the token or link if it needs one"
+            )),
             StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN => {
                 self.permanent(format!("access denied ({status})"))
             }

@@ -14,6 +14,7 @@ mod http;
 mod link;
 mod linked;
 mod locator;
+mod token;
 
 use std::sync::Arc;
 
@@ -27,6 +28,7 @@ pub use file::FileSource;
 pub use http::{HttpSource, Timeouts};
 pub use link::{Link, LinkSpec};
 pub use linked::LinkedSource;
+pub use token::use_token;
 
 /// Most bytes that are reserved before any of them has arrived.
 const RESERVE_BYTES: u64 = 4 << 20;

@@ -8,6 +8,7 @@ use lodestream_protocol::{BATCH_TYPE, BatchRequest};
 use super::head::{Request, Wanted};
 use crate::{
     file::DatasetFile,
+    metrics::Kind,
     multipart::DATASET_TYPE,
     routes::{BATCH_OFFER, CROSS_ORIGIN_FIELDS, Site, cache_control, reaches_beyond},
 };
@@ -33,7 +34,7 @@ pub(super) enum Content {
 impl Answer {
     /// `None` where the long way has another answer.
     pub(super) async fn to(site: &Arc<Site>, request: &Request<'_>, body: &[u8]) -> Option<Self> {
-        let file = site.dataset(request.file_name).await?.ok()?;
+        let file = site.dataset(request.file_name).await.ok()?;
         let tag = file.validators.etag.trim_matches('"');
         if request.version.is_some_and(|version| version != tag) {
             return None;
@@ -51,6 +52,21 @@ impl Answer {
             }
         };
         Some(Self { file, by_content: request.version.is_some(), content })
+    }
+
+    pub(super) fn status(&self) -> u16 {
+        match self.content {
+            Content::Range(_) => 206,
+            Content::Batch(_) => 200,
+        }
+    }
+
+    /// For the figures.
+    pub(super) fn kind(&self) -> Kind {
+        match self.content {
+            Content::Range(_) => Kind::File,
+            Content::Batch(_) => Kind::Batch,
+        }
     }
 
     /// Bytes behind the head.

@@ -28,7 +28,9 @@ use self::{
     answer::Answer,
     head::{Head, Wanted},
 };
-use crate::{connection::ConnectionLimits, routes::Site};
+use crate::{
+    connection::ConnectionLimits, metrics::Answered, routes::Site, storage::dataset_name,
+};
 
 /// What a client may send that is no whole head before the long way takes over.
 const MAX_HEAD_BYTES: usize = 4 << 10;
@@ -42,9 +44,6 @@ pub(crate) async fn serve(
     mut stopping: watch::Receiver<bool>,
 ) -> Option<BytesMut> {
     let mut bytes = BytesMut::new();
-    if !site.has_short_way() {
-        return Some(bytes);
-    }
     let mut reply = Vec::new();
     loop {
         // For the whole request, and for the pause before it: a client that sends a byte now and then
@@ -85,12 +84,29 @@ pub(crate) async fn serve(
                 Err(_) => return None,
             }
         };
+        // Rules may have come since the connection began.
+        if !site.has_short_way() {
+            return Some(bytes);
+        }
+        let start = Instant::now();
         let answer = Answer::to(site, &request, &bytes[body.clone()]).await;
         let Some(answer) = answer else { return Some(bytes) };
         reply.clear();
         answer.write_head(&mut reply);
+        let until_first_byte = start.elapsed();
+        let sent = send::send(stream, site, &answer, &reply, limits).await;
+        site.metrics.count(&Answered {
+            dataset: dataset_name(request.file_name).unwrap_or_default(),
+            kind: answer.kind(),
+            status: answer.status(),
+            // What was sent of a broken answer, nobody knows to the byte.
+            bytes: if sent.is_ok() { answer.len() } else { 0 },
+            until_first_byte,
+            until_last_byte: start.elapsed(),
+            is_whole: sent.is_ok(),
+        });
         bytes.advance(body.end);
-        if let Err(e) = send::send(stream, site, &answer, &reply, limits).await {
+        if let Err(e) = sent {
             tracing::debug!("{}: response broken off: {e}", answer.file.path.display());
             return None;
         }

@@ -14,7 +14,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::{Refusal, Site, batch};
+use super::{Refusal, Site, batch, missing};
 use crate::{
     body::FileBody,
     conditional::Verdict,
@@ -57,19 +57,22 @@ pub(super) struct Opened {
     by_content: bool,
 }
 
+impl Opened {
+    /// How long what comes from this address may be kept.
+    pub(super) const fn cache_control(&self) -> HeaderValue {
+        HeaderValue::from_static(cache_control(self.by_content))
+    }
+}
+
 /// Opens the dataset of that name.
 pub(super) async fn open(
     site: &Arc<Site>,
     file_name: &str,
     query: Option<&str>,
 ) -> Result<Opened, Refusal> {
-    let missing = || {
-        let line = format!("no dataset file {file_name:?} here; /datasets lists all");
-        Refusal::new(StatusCode::NOT_FOUND, line)
-    };
-    let file = match site.dataset(file_name).await.ok_or_else(missing)? {
+    let file = match site.dataset(file_name).await {
         Ok(file) => file,
-        Err(OpenError::Missing) => return Err(missing()),
+        Err(OpenError::Missing) => return Err(missing(file_name)),
         Err(OpenError::Unreadable(reason)) => {
             tracing::warn!("{file_name}: {reason}");
             // It may be on its way into the folder: worth another try.
@@ -86,7 +89,8 @@ pub(super) async fn open(
 }
 
 fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> Response {
-    let Opened { file, by_content } = opened;
+    let cache_control = opened.cache_control();
+    let file = opened.file;
     let length = file.bytes;
     let verdict = file.validators.judge(headers);
     if verdict == Verdict::Failed {
@@ -95,7 +99,7 @@ fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> 
     }
     let mut response = Response::builder()
         .header(header::ETAG, &file.etag)
-        .header(header::CACHE_CONTROL, HeaderValue::from_static(cache_control(by_content)));
+        .header(header::CACHE_CONTROL, cache_control);
     if let Some(modified) = &file.last_modified {
         response = response.header(header::LAST_MODIFIED, modified);
     }
