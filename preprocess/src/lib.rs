@@ -20,6 +20,7 @@ mod numbers;
 pub mod numerics;
 mod plan;
 mod positioned;
+pub mod preview;
 pub mod readers;
 mod repack;
 mod schedule;

@@ -9,6 +9,7 @@
 //! columns). [`Dataset`] walks that way synchronously over any [`ReadAt`].
 
 mod attribute;
+mod batch;
 mod boot;
 mod column;
 mod dataset;
@@ -23,6 +24,11 @@ mod position;
 mod wire;
 
 pub use attribute::{Attribute, Domain, ScalarType, Storage};
+pub use batch::{
+    BATCH_HEAD_BYTES, BATCH_REQUEST_TYPE, BATCH_TYPE, BatchDecoder, BatchPart, BatchRequest,
+    BatchStep, FRAME_HEAD_BYTES, MAX_BATCH_BYTES, MAX_BATCH_PARTS, MAX_BATCH_REQUEST_BYTES,
+    batch_head, frame_head,
+};
 pub use boot::{
     BOOT_SPECULATIVE_BYTES, Boot, HEADER_BYTES, Header, MAGIC, VERSION_MAJOR, VERSION_MINOR,
 };

@@ -1,28 +1,42 @@
 //! One client's connection.
 
-use std::time::Duration;
+use std::{
+    io::{self, Cursor},
+    net::SocketAddr,
+    pin::Pin,
+    sync::Arc,
+    time::Duration,
+};
 
 use axum::Router;
-use hyper::server::conn::http1;
+use hyper::server::conn::{http1, http2};
 use hyper_util::{
-    rt::{TokioIo, TokioTimer},
+    rt::{TokioExecutor, TokioIo, TokioTimer},
     server::graceful::Watcher,
     service::TowerToHyperService,
 };
-use tokio::net::TcpStream;
+use tokio::{
+    io::{AsyncRead, AsyncReadExt, AsyncWrite},
+    net::TcpStream,
+    sync::watch,
+    time::timeout,
+};
 use tokio_io_timeout::TimeoutStream;
+use tower_http::add_extension::AddExtension;
 
-use crate::config::ServeConfig;
+use crate::{config::ServeConfig, hot, peer::Peer, routes::Site, tls::Tls};
 
 /// Most bytes of a request's head, and of a response waiting for the client besides the piece that
 /// was read last.
 const MAX_QUEUED_BYTES: usize = 64 << 10;
+/// What a client says first that speaks HTTP/2 without having agreed on it (RFC 9113, section 3.4).
+const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
 /// What every connection is held to.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ConnectionLimits {
-    head_timeout: Duration,
-    write_timeout: Duration,
+    pub(crate) head_timeout: Duration,
+    pub(crate) write_timeout: Duration,
 }
 
 impl From<&ServeConfig> for ConnectionLimits {
@@ -31,25 +45,125 @@ impl From<&ServeConfig> for ConnectionLimits {
     }
 }
 
+/// What all connections share.
+#[derive(Debug)]
+pub(crate) struct Host {
+    pub(crate) site: Arc<Site>,
+    pub(crate) router: Router,
+    pub(crate) tls: Option<Arc<Tls>>,
+    pub(crate) limits: ConnectionLimits,
+}
+
 /// Serves requests until the client leaves, breaks a limit, or the server stops.
 pub(crate) async fn serve(
     stream: TcpStream,
-    router: Router,
-    limits: ConnectionLimits,
+    address: SocketAddr,
+    host: Arc<Host>,
     watcher: Watcher,
+    stopping: watch::Receiver<bool>,
 ) {
+    let metrics = &host.site.metrics;
+    metrics.accepted.inc();
+    metrics.connections.inc();
+    if let Err(e) = converse(stream, address, &host, watcher, stopping).await {
+        tracing::debug!("connection of {address} ended: {e}");
+    }
+    metrics.connections.dec();
+}
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+async fn converse(
+    stream: TcpStream,
+    address: SocketAddr,
+    host: &Host,
+    watcher: Watcher,
+    stopping: watch::Receiver<bool>,
+) -> Result<(), Failure> {
     // Without it, a small response waits for the acknowledgement of the one before: 40 ms.
     if let Err(e) = stream.set_nodelay(true) {
         tracing::debug!("connection without TCP_NODELAY: {e}");
     }
+    let limits = host.limits;
+    let peer = Peer { ip: address.ip(), is_encrypted: host.tls.is_some() };
+    let Some(tls) = &host.tls else {
+        let is_http2 = timeout(limits.head_timeout, begins_with_preface(&stream)).await??;
+        if is_http2 {
+            return speak(limited(stream, limits), true, peer, host, watcher).await;
+        }
+        let begun = hot::serve(&stream, &host.site, limits, stopping).await;
+        let Some(begun) = begun else { return Ok(()) };
+        let (reader, writer) = stream.into_split();
+        // What was read of a request already comes first.
+        let stream = tokio::io::join(Cursor::new(begun).chain(reader), writer);
+        return speak(limited(stream, limits), false, peer, host, watcher).await;
+    };
+    let handshake = tls.acceptor().accept(limited(stream, limits));
+    let stream = match timeout(limits.head_timeout, handshake).await {
+        Ok(Ok(stream)) => stream,
+        failed => {
+            host.site.metrics.handshakes_failed.inc();
+            failed??;
+            return Ok(());
+        }
+    };
+    let is_http2 = stream.get_ref().1.alpn_protocol() == Some(b"h2");
+    speak(stream, is_http2, peer, host, watcher).await
+}
+
+fn limited<S>(stream: S, limits: ConnectionLimits) -> Pin<Box<TimeoutStream<S>>>
+where
+    S: AsyncRead + AsyncWrite,
+{
     let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(limits.write_timeout));
-    let connection = http1::Builder::new()
-        .timer(TokioTimer::new())
-        .header_read_timeout(limits.head_timeout)
-        .max_buf_size(MAX_QUEUED_BYTES)
-        .serve_connection(TokioIo::new(Box::pin(stream)), TowerToHyperService::new(router));
-    if let Err(e) = watcher.watch(connection).await {
-        tracing::debug!("connection ended: {e}");
+    Box::pin(stream)
+}
+
+/// Whether a client opens with HTTP/2's first words. Nothing is taken from the stream.
+async fn begins_with_preface(stream: &TcpStream) -> io::Result<bool> {
+    let mut first = [0; PREFACE.len()];
+    loop {
+        let seen = stream.peek(&mut first).await?;
+        if seen == 0 || !PREFACE.starts_with(&first[..seen]) {
+            return Ok(false);
+        }
+        if seen == first.len() {
+            return Ok(true);
+        }
+        // The rest is on its way; the system tells of no more bytes while these are not taken.
+        tokio::time::sleep(Duration::from_millis(1)).await;
     }
+}
+
+async fn speak<S>(
+    stream: S,
+    is_http2: bool,
+    peer: Peer,
+    host: &Host,
+    watcher: Watcher,
+) -> Result<(), Failure>
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let service = TowerToHyperService::new(AddExtension::new(host.router.clone(), peer));
+    let stream = TokioIo::new(stream);
+    let limits = host.limits;
+    if is_http2 {
+        let mut builder = http2::Builder::new(TokioExecutor::new());
+        builder
+            .timer(TokioTimer::new())
+            .max_header_list_size(MAX_QUEUED_BYTES as u32)
+            .keep_alive_interval(Some(limits.head_timeout))
+            .keep_alive_timeout(limits.write_timeout);
+        watcher.watch(builder.serve_connection(stream, service)).await?;
+    } else {
+        let mut builder = http1::Builder::new();
+        builder
+            .timer(TokioTimer::new())
+            .header_read_timeout(limits.head_timeout)
+            .max_buf_size(MAX_QUEUED_BYTES);
+        watcher.watch(builder.serve_connection(stream, service)).await?;
+    }
+    Ok(())
 }

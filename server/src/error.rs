@@ -13,6 +13,14 @@ pub enum Error {
         /// What the system said.
         source: io::Error,
     },
+    /// The object store's address means nothing, or its settings do not.
+    #[error("{url}: {reason}")]
+    Objects {
+        /// The address.
+        url: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// The address cannot be listened on.
     #[error("cannot listen on {addr}: {source}")]
     Listen {
@@ -20,6 +28,23 @@ pub enum Error {
         addr: SocketAddr,
         /// What the system said.
         source: io::Error,
+    },
+    /// Other machines reach the address, and nothing says that they may.
+    #[error(
+        "{addr} is reached by other machines: say who may read what in the configuration's [access], \
+         or that everyone may read everything with --public"
+    )]
+    Exposed {
+        /// The address.
+        addr: SocketAddr,
+    },
+    /// Certificate or key cannot be used.
+    #[error("{}: {reason}", path.display())]
+    Tls {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
     },
     /// The system gave no thread or no runtime.
     #[error("cannot start the server's thread: {0}")]

@@ -1,28 +1,26 @@
 //! The list of datasets.
 
-use std::{
-    collections::HashMap,
-    fs::Metadata,
-    io,
-    sync::{Mutex, PoisonError},
-    time::SystemTime,
-};
+use std::{collections::HashMap, io, sync::Arc, time::SystemTime};
 
-use lodestream_preprocess::FileSource;
-use lodestream_protocol::{Attribute, Dataset};
+use lodestream_protocol::{Attribute, Dataset, ScalarType};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde::{Deserialize, Serialize};
+use tokio::sync::Mutex;
+use utoipa::ToSchema;
 
 use crate::{
-    file::{OpenError, open_regular},
-    folder::{Folder, dataset_name},
+    access::Rights,
+    conditional::http_date,
+    file::OpenError,
+    storage::{Identity, Listing, Readable, SUFFIX, Source, Storage, dataset_name},
 };
 
 /// Characters of a path segment that need no escape (RFC 3986, section 2.3).
-const SEGMENT: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
+pub(crate) const SEGMENT: &AsciiSet =
+    &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
 /// What `GET /datasets` answers.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct DatasetIndex {
     /// Datasets, sorted by file name.
     pub datasets: Vec<DatasetEntry>,
@@ -30,13 +28,29 @@ pub struct DatasetIndex {
     pub unreadable: Vec<UnreadableEntry>,
 }
 
+impl DatasetIndex {
+    /// Leaves out what may not be read, and gives the rest addresses that open it.
+    pub(crate) fn keep_readable(&mut self, rights: &Rights) {
+        self.datasets.retain(|entry| rights.may_read(&format!("{}{SUFFIX}", entry.name)));
+        self.unreadable.retain(|entry| rights.may_read(&entry.file));
+        for entry in &mut self.datasets {
+            entry.url = rights.address(&entry.url);
+            entry.content_url = rights.address(&entry.content_url);
+            entry.preview = entry.preview.as_deref().map(|url| rights.address(url));
+        }
+    }
+}
+
 /// One dataset of the list.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DatasetEntry {
     /// File name without `.lods`.
     pub name: String,
     /// Address, relative to that of the list.
     pub url: String,
+    /// Address of this very content, relative to that of the list: never of another, so that what it
+    /// brings may be kept for good.
+    pub content_url: String,
     /// Elements.
     pub points: u64,
     /// Length of the file in bytes.
@@ -47,12 +61,16 @@ pub struct DatasetEntry {
     pub bounds: Option<BoundsEntry>,
     /// What each element carries besides its position.
     pub attributes: Vec<AttributeEntry>,
+    /// When the file was last changed, as RFC 3339 writes it, where that is known.
+    pub modified: Option<String>,
+    /// Address of a small picture, relative to that of the list, where there is one.
+    pub preview: Option<String>,
     /// Identity of the content, in hexadecimal: the entity tag without its quotes.
     pub content_id: String,
 }
 
 /// An axis-aligned box in world units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BoundsEntry {
     /// Lowest coordinates.
     pub min: [f64; 3],
@@ -61,13 +79,13 @@ pub struct BoundsEntry {
 }
 
 /// One attribute of a dataset in the list.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AttributeEntry {
     /// Unique name.
     pub name: String,
     /// Type of each component, as in the manifest.
     #[serde(rename = "type")]
-    pub scalar: lodestream_protocol::ScalarType,
+    pub scalar: String,
     /// Components per value.
     pub components: u8,
     /// Whether all elements share one value.
@@ -75,7 +93,7 @@ pub struct AttributeEntry {
 }
 
 /// A file that is not served.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct UnreadableEntry {
     /// File name.
     pub file: String,
@@ -83,90 +101,117 @@ pub struct UnreadableEntry {
     pub reason: String,
 }
 
-/// Tells whether a file is still the one that was looked at.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Identity {
-    length: u64,
-    modified: Option<SystemTime>,
-    #[cfg(unix)]
-    device_and_inode: (u64, u64),
-}
-
-impl Identity {
-    fn of(metadata: &Metadata) -> Self {
-        #[cfg(unix)]
-        use std::os::unix::fs::MetadataExt;
-        Self {
-            length: metadata.len(),
-            modified: metadata.modified().ok(),
-            #[cfg(unix)]
-            device_and_inode: (metadata.dev(), metadata.ino()),
-        }
-    }
-}
-
 /// Makes the list, and remembers the entries of files that have not changed since.
 #[derive(Debug, Default)]
 pub(crate) struct IndexCache {
-    entries: Mutex<HashMap<String, (Identity, DatasetEntry)>>,
+    /// Held while the list is made: who comes meanwhile waits, and finds it all here.
+    entries: Mutex<HashMap<String, Known>>,
+}
+
+/// An entry, and what it was made from.
+#[derive(Debug, Clone)]
+struct Known {
+    identity: Identity,
+    entry: DatasetEntry,
 }
 
 impl IndexCache {
-    /// Reads the folder (blocking).
-    pub(crate) fn read(&self, folder: &Folder) -> io::Result<DatasetIndex> {
-        let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut known = std::mem::take(&mut *entries);
-        let mut index = DatasetIndex::default();
-        for file_name in folder.file_names()? {
-            match look_up(folder, &file_name, known.remove(&file_name)) {
-                Ok((identity, entry)) => {
-                    index.datasets.push(entry.clone());
-                    entries.insert(file_name, (identity, entry));
-                }
-                Err(OpenError::Missing) => {}
-                Err(OpenError::Unreadable(reason)) => {
-                    index.unreadable.push(UnreadableEntry { file: file_name, reason });
-                }
-            }
-        }
+    /// Reads the list.
+    pub(crate) async fn read(&self, storage: &Arc<Storage>) -> io::Result<DatasetIndex> {
+        let mut entries = self.entries.lock().await;
+        let listing = storage.list().await?;
+        let known = std::mem::take(&mut *entries);
+        let is_still = |name: &&String| {
+            known.get(*name).is_some_and(|known| listing.is_still(name, &known.identity))
+        };
+        let new: Vec<_> = listing.datasets.iter().filter(|name| !is_still(name)).cloned().collect();
+        storage.warm(&new).await;
+        let storage = Arc::clone(storage);
+        let looking = tokio::task::spawn_blocking(move || look(&storage, &listing, known));
+        let (index, known) = looking.await.map_err(io::Error::other)?;
+        *entries = known;
         Ok(index)
     }
 }
 
-fn look_up(
-    folder: &Folder,
-    file_name: &str,
-    known: Option<(Identity, DatasetEntry)>,
-) -> Result<(Identity, DatasetEntry), OpenError> {
-    let path = folder.path_of(file_name).ok_or(OpenError::Missing)?;
-    if let (Some(known), Ok(metadata)) = (known, std::fs::metadata(&path))
-        && known.0 == Identity::of(&metadata)
-    {
-        return Ok(known);
+/// Looks at each file (blocking).
+fn look(
+    storage: &Storage,
+    listing: &Listing,
+    mut known: HashMap<String, Known>,
+) -> (DatasetIndex, HashMap<String, Known>) {
+    let mut index = DatasetIndex::default();
+    let mut entries = HashMap::with_capacity(listing.datasets.len());
+    for file_name in &listing.datasets {
+        match look_at(storage, listing, file_name, known.remove(file_name)) {
+            Ok(found) => {
+                index.datasets.push(found.entry.clone());
+                entries.insert(file_name.clone(), found);
+            }
+            Err(OpenError::Missing) => {}
+            Err(OpenError::Unreadable(reason)) => {
+                index.unreadable.push(UnreadableEntry { file: file_name.clone(), reason });
+            }
+        }
     }
-    let (file, metadata) = open_regular(&path)?;
-    let dataset =
-        Dataset::open(FileSource::from(file)).map_err(|e| OpenError::Unreadable(e.to_string()))?;
-    Ok((Identity::of(&metadata), entry(file_name, &dataset)))
+    (index, entries)
 }
 
-fn entry(file_name: &str, dataset: &Dataset<FileSource>) -> DatasetEntry {
+fn look_at(
+    storage: &Storage,
+    listing: &Listing,
+    file_name: &str,
+    known: Option<Known>,
+) -> Result<Known, OpenError> {
+    let known = known.filter(|known| storage.is_still(listing, file_name, &known.identity));
+    let mut found = match known {
+        Some(known) => known,
+        None => {
+            let Readable { identity, source, modified } = storage.readable(file_name)?;
+            let dataset =
+                Dataset::open(source).map_err(|e| OpenError::Unreadable(e.to_string()))?;
+            Known { identity, entry: entry(file_name, &dataset, modified) }
+        }
+    };
+    // A picture comes after its dataset, and may be that of the one before for a while.
+    let entry = &mut found.entry;
+    if !listing.has_preview(file_name) {
+        entry.preview = None;
+    } else if entry.preview.is_none() && storage.has_preview_of(file_name, &entry.content_id) {
+        entry.preview = Some(format!("{}/preview.png?v={}", entry.url, entry.content_id));
+    }
+    Ok(found)
+}
+
+fn entry(file_name: &str, dataset: &Dataset<Source>, modified: Option<SystemTime>) -> DatasetEntry {
     let manifest = dataset.manifest();
     let header = &dataset.boot().header;
     let attribute = |a: &Attribute| AttributeEntry {
         name: a.name.clone(),
-        scalar: a.scalar,
+        scalar: scalar_name(a.scalar),
         components: a.components,
         constant: a.group().is_none(),
     };
+    let url = format!("datasets/{}", utf8_percent_encode(file_name, SEGMENT));
+    // Times that cannot be told are left out, as HTTP's dates are.
+    let modified = modified.and_then(|modified| http_date(modified, SystemTime::now()));
+    let rfc3339 = |date| humantime::format_rfc3339_seconds(SystemTime::from(date)).to_string();
     DatasetEntry {
         name: dataset_name(file_name).unwrap_or(file_name).to_owned(),
-        url: format!("datasets/{}", utf8_percent_encode(file_name, SEGMENT)),
+        content_url: format!("{url}?v={}", header.content_id_hex()),
+        preview: None,
+        url,
         points: manifest.points,
         bytes: header.file_bytes,
         levels: manifest.levels,
         bounds: manifest.bounds_world().map(|(min, max)| BoundsEntry { min, max }),
         attributes: manifest.attributes.iter().map(attribute).collect(),
+        modified: modified.map(rfc3339),
         content_id: header.content_id_hex(),
     }
+}
+
+/// The type's name in the manifest.
+fn scalar_name(scalar: ScalarType) -> String {
+    format!("{scalar:?}").to_lowercase()
 }

@@ -3,7 +3,9 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use lodestream_server::commands::{build, finish, inspect, serve, verify};
+use lodestream_server::commands::{
+    build, finish, inspect, ping, preview, serve, sign, token, verify,
+};
 
 /// Turn scans into level-of-detail datasets and host them over HTTP
 #[derive(Debug, Parser)]
@@ -15,17 +17,25 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Serve(serve::ServeArgs),
+    Serve(Box<serve::ServeArgs>),
+    Ping(ping::PingArgs),
+    Token(token::TokenArgs),
+    Sign(sign::SignArgs),
     Build(build::BuildArgs),
     Inspect(inspect::InspectArgs),
     Verify(verify::VerifyArgs),
+    Preview(preview::PreviewArgs),
 }
 
 fn main() -> ExitCode {
     finish(match Cli::parse().command {
-        Command::Serve(args) => serve::run(args),
+        Command::Serve(args) => serve::run(*args),
+        Command::Ping(args) => ping::run(&args),
+        Command::Token(args) => token::run(&args),
+        Command::Sign(args) => sign::run(&args),
         Command::Build(args) => build::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Verify(args) => verify::run(args),
+        Command::Preview(args) => preview::run(&args),
     })
 }

@@ -10,13 +10,15 @@ use tokio::sync::oneshot;
 use crate::{
     config::ServeConfig,
     error::{Error, Result},
-    server::Server,
+    server::{Control, Server},
 };
 
 /// A server that runs until it is stopped or dropped.
 #[derive(Debug)]
 pub struct RunningServer {
     addr: SocketAddr,
+    url: String,
+    control: Control,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -33,7 +35,9 @@ pub fn spawn(config: ServeConfig) -> Result<RunningServer> {
         .spawn(move || run(config, &report, stopped))
         .map_err(Error::Thread)?;
     match bound.recv() {
-        Ok(Ok(addr)) => Ok(RunningServer { addr, stop: Some(stop), thread: Some(thread) }),
+        Ok(Ok((addr, url, control))) => {
+            Ok(RunningServer { addr, url, control, stop: Some(stop), thread: Some(thread) })
+        }
         Ok(Err(e)) => Err(e),
         Err(_) => Err(Error::Panicked),
     }
@@ -41,7 +45,7 @@ pub fn spawn(config: ServeConfig) -> Result<RunningServer> {
 
 fn run(
     config: ServeConfig,
-    report: &mpsc::SyncSender<Result<SocketAddr>>,
+    report: &mpsc::SyncSender<Result<(SocketAddr, String, Control)>>,
     stopped: oneshot::Receiver<()>,
 ) {
     // A send fails only where `spawn` has ended, which then has reported another failure.
@@ -52,7 +56,7 @@ fn run(
     runtime.block_on(async {
         match Server::bind(config).await {
             Ok(server) => {
-                let _ = report.send(Ok(server.local_addr()));
+                let _ = report.send(Ok((server.local_addr(), server.url(), server.control())));
                 // A dropped handle stops the server as a signal does.
                 server.run(async { stopped.await.unwrap_or_default() }).await;
             }
@@ -69,10 +73,16 @@ impl RunningServer {
         self.addr
     }
 
-    /// `http://ADDRESS:PORT`, without a slash at the end.
+    /// `http://ADDRESS:PORT` or `https://…`, without a slash at the end.
     #[must_use]
     pub fn url(&self) -> String {
-        format!("http://{}", self.addr)
+        self.url.clone()
+    }
+
+    /// What changes the server while it runs.
+    #[must_use]
+    pub const fn control(&self) -> &Control {
+        &self.control
     }
 
     /// Stops accepting, lets responses under way end within the drain time, and joins the thread.

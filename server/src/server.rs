@@ -1,42 +1,76 @@
 //! The server: a bound socket, then a loop that accepts connections until it is asked to stop.
 //!
 //! The loop is axum's own, but for what that one does not offer: a limit on connections, timeouts
-//! on slow clients, and an end to draining.
+//! on slow clients, TLS whose certificate can be changed, and an end to draining.
 
-use std::{future::Future, net::SocketAddr, pin::pin, time::Duration};
+use std::{future::Future, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
 
-use axum::Router;
 use hyper_util::server::graceful::GracefulShutdown;
-use tokio::{net::TcpListener, task::JoinSet};
+use tokio::{net::TcpListener, sync::watch, task::JoinSet, time::MissedTickBehavior};
 
 use crate::{
+    access::Access,
     config::ServeConfig,
-    connection::{self, ConnectionLimits},
+    connection::{self, ConnectionLimits, Host},
     error::{Error, Result},
     routes::{self, Site},
+    tls::Tls,
 };
+
+/// How often certificate and key are looked at.
+const CERTIFICATE_CHECK: Duration = Duration::from_secs(30);
 
 /// A server that is bound to its address.
 #[derive(Debug)]
 pub struct Server {
     listener: TcpListener,
     addr: SocketAddr,
-    router: Router,
+    host: Arc<Host>,
     config: ServeConfig,
 }
 
-impl Server {
-    /// Checks the folder and binds the address. Needs a tokio runtime with I/O and time.
+/// Changes a server while it runs.
+#[derive(Debug, Clone)]
+pub struct Control {
+    host: Arc<Host>,
+    config: ServeConfig,
+}
+
+impl Control {
+    /// Says anew who may read what, for requests from now on.
     ///
     /// # Errors
-    /// [`Error::Folder`] or [`Error::Listen`].
+    /// [`Error::Exposed`]: the old rules hold then.
+    pub fn set_access(&self, access: Access) -> Result<()> {
+        ServeConfig { access: access.clone(), ..self.config.clone() }.check()?;
+        self.host.site.set_access(access);
+        Ok(())
+    }
+
+    /// Reads certificate and key again, for connections from now on.
+    ///
+    /// # Errors
+    /// [`Error::Tls`]: the old ones stay in use then.
+    pub fn reload_tls(&self) -> Result<()> {
+        self.host.tls.as_ref().map_or(Ok(()), |tls| tls.reload())
+    }
+}
+
+impl Server {
+    /// Checks the configuration and binds the address. Needs a tokio runtime with I/O and time.
+    ///
+    /// # Errors
+    /// [`Error::Exposed`], [`Error::Folder`], [`Error::Tls`] or [`Error::Listen`].
     pub async fn bind(config: ServeConfig) -> Result<Self> {
+        config.check()?;
         let site = Site::open(&config)?;
+        let tls = config.tls.clone().map(Tls::open).transpose()?.map(Arc::new);
         let failed = |source| Error::Listen { addr: config.listen, source };
         let listener = TcpListener::bind(config.listen).await.map_err(failed)?;
         let addr = listener.local_addr().map_err(failed)?;
-        let router = routes::router(site, config.response_timeout);
-        Ok(Self { listener, addr, router, config })
+        let router = routes::router(Arc::clone(&site), &config);
+        let limits = ConnectionLimits::from(&config);
+        Ok(Self { listener, addr, host: Arc::new(Host { site, router, tls, limits }), config })
     }
 
     /// The address it listens on, with the port that was taken for port 0.
@@ -45,25 +79,49 @@ impl Server {
         self.addr
     }
 
-    /// Serves until `shutdown` is ready, then lets responses under way end within
-    /// [`ServeConfig::drain_timeout`].
+    /// `http://ADDRESS:PORT` or `https://…`, without a slash at the end.
+    #[must_use]
+    pub fn url(&self) -> String {
+        let scheme = if self.host.tls.is_some() { "https" } else { "http" };
+        format!("{scheme}://{}", self.addr)
+    }
+
+    /// What changes the server once it runs.
+    #[must_use]
+    pub fn control(&self) -> Control {
+        Control { host: Arc::clone(&self.host), config: self.config.clone() }
+    }
+
+    /// Serves until `shutdown` is ready, goes on for [`ServeConfig::drain_delay`], then lets
+    /// responses under way end within [`ServeConfig::drain_timeout`].
     pub async fn run(self, shutdown: impl Future<Output = ()>) {
-        let limits = ConnectionLimits::from(&self.config);
         let graceful = GracefulShutdown::new();
         let mut connections = JoinSet::new();
-        let mut shutdown = pin!(shutdown);
+        let (stop, stopping) = watch::channel(false);
+        let site = Arc::clone(&self.host.site);
+        let sweeping = tokio::spawn(Arc::clone(&site).sweep());
+        let mut shutdown = pin!(async {
+            shutdown.await;
+            site.begin_drain();
+            tokio::time::sleep(self.config.drain_delay).await;
+        });
+        let mut certificate_check = tokio::time::interval(CERTIFICATE_CHECK);
+        certificate_check.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             tokio::select! {
                 () = &mut shutdown => break,
                 Some(_) = connections.join_next(), if !connections.is_empty() => {}
+                _ = certificate_check.tick(), if self.host.tls.is_some() => self.check_certificate(),
                 accepted = self.listener.accept(),
                     if connections.len() < self.config.max_connections =>
                 {
                     match accepted {
-                        Ok((stream, _)) => {
-                            let router = self.router.clone();
-                            let watcher = graceful.watcher();
-                            connections.spawn(connection::serve(stream, router, limits, watcher));
+                        Ok((stream, address)) => {
+                            let (host, watcher) = (Arc::clone(&self.host), graceful.watcher());
+                            let stopping = stopping.clone();
+                            connections.spawn(connection::serve(
+                                stream, address, host, watcher, stopping,
+                            ));
                         }
                         Err(e) => recover(&e).await,
                     }
@@ -71,6 +129,8 @@ impl Server {
             }
         }
         drop(self.listener);
+        // It fails only where nobody listens.
+        let _ = stop.send(true);
         let drained = async {
             graceful.shutdown().await;
             while connections.join_next().await.is_some() {}
@@ -79,6 +139,16 @@ impl Server {
             tracing::warn!("{} connections cut off at shutdown", connections.len());
         }
         connections.shutdown().await;
+        sweeping.abort();
+    }
+
+    /// Takes a renewed certificate into use.
+    fn check_certificate(&self) {
+        let Some(tls) = self.host.tls.as_ref().filter(|tls| tls.has_changed()) else { return };
+        match tls.reload() {
+            Ok(()) => tracing::info!("certificate and key were read again"),
+            Err(e) => tracing::error!("the old certificate stays in use: {e}"),
+        }
     }
 }
 

@@ -29,6 +29,8 @@ pub struct EngineConfig {
     pub requests_in_flight: usize,
     /// Which neighbouring ranges are fetched with one request.
     pub coalesce: Coalesce,
+    /// Whether one request asks for ranges that are no neighbours, of hosts that take such.
+    pub batches: bool,
     /// In which order wanted pieces are loaded.
     pub order: LoadOrder,
     /// Whether a request is held back while those before it keep the link busy.
@@ -91,6 +93,7 @@ impl Default for EngineConfig {
             cache_bytes: 512 << 20,
             requests_in_flight: 6,
             coalesce: Coalesce::default(),
+            batches: true,
             order: LoadOrder::Importance,
             paces: true,
             cancels: true,

@@ -46,6 +46,7 @@ impl Policy {
         let apart = EngineConfig {
             cell_px: 0.0,
             coalesce: Coalesce::NONE,
+            batches: false,
             paces: false,
             cancels: false,
             occlusion: false,

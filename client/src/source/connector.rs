@@ -8,7 +8,9 @@ use std::{
     time::Duration,
 };
 
-use reqwest::{Client, Url};
+use reqwest::{Client, Url, header};
+
+use super::token::authorization;
 
 /// Connections to one host that are kept for the next request.
 const MOST_IDLE: usize = 16;
@@ -58,6 +60,10 @@ impl Connector {
             .pool_max_idle_per_host(MOST_IDLE)
             .connect_timeout(self.timeouts.connect)
             .read_timeout(self.timeouts.silence);
+        if let Some(token) = authorization() {
+            builder =
+                builder.default_headers([(header::AUTHORIZATION, token)].into_iter().collect());
+        }
         if self.is_loopback {
             builder = builder.no_proxy();
         }

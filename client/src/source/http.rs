@@ -5,16 +5,23 @@
 //! whole files again and again; its 200 is recognised from the head and the connection is closed
 //! without the body.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{
+    Arc, OnceLock,
+    atomic::{AtomicBool, Ordering},
+};
 
 use bytes::Bytes;
+use lodestream_protocol::{
+    BATCH_REQUEST_TYPE, BATCH_TYPE, BatchDecoder, BatchPart, BatchRequest, MAX_BATCH_BYTES,
+    MAX_BATCH_PARTS,
+};
 use reqwest::{
     Response, StatusCode, Url,
     header::{self, HeaderMap},
 };
 
 use super::{
-    Announced, SourceError,
+    Announced, BatchLimits, SourceError,
     connector::{Connections, Connector, Timeouts},
 };
 
@@ -32,6 +39,17 @@ struct Inner {
     place: String,
     /// Set by the first good answer.
     identity: OnceLock<Identity>,
+    /// What the host offers, set by the first answer that tells.
+    batches: OnceLock<Offer>,
+    /// Something between here and the host lets no batches through.
+    takes_no_batches: AtomicBool,
+}
+
+/// A host's offer to take requests for many parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Offer {
+    content_id: [u8; 16],
+    limits: BatchLimits,
 }
 
 /// What tells one version of a file from another.
@@ -76,7 +94,10 @@ impl HttpSource {
 
     fn through(connector: Arc<Connector>, url: Url) -> Self {
         let place = without_secrets(&url);
-        Self { inner: Arc::new(Inner { connector, url, place, identity: OnceLock::new() }) }
+        let (identity, batches) = (OnceLock::new(), OnceLock::new());
+        let takes_no_batches = AtomicBool::new(false);
+        let inner = Inner { connector, url, place, identity, batches, takes_no_batches };
+        Self { inner: Arc::new(inner) }
     }
 
     /// A source of whatever lies at the URL now. Shares connections.
@@ -117,6 +138,77 @@ impl HttpSource {
         let (response, range) = self.ask(Ask { offset: 0, len, may_end: true }).await?;
         let announced = Announced { len: range.end - range.start, total: range.total };
         self.read_body(response, announced.len, &mut |piece| sink(piece, announced)).await
+    }
+
+    pub(super) fn batch_limits(&self) -> Option<BatchLimits> {
+        let is_barred = self.inner.takes_no_batches.load(Ordering::Relaxed);
+        self.inner.batches.get().filter(|_| !is_barred).map(|offer| offer.limits)
+    }
+
+    /// Without an offer, or where what lies between bars batches after all, the parts come one by one.
+    pub(super) async fn stream_parts(
+        &self,
+        parts: &[BatchPart],
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<(), SourceError> {
+        let offer = self.inner.batches.get().filter(|_| self.batch_limits().is_some());
+        if let Some(offer) = offer {
+            let request = BatchRequest { content_id: offer.content_id, parts: parts.to_vec() };
+            match self.ask_for_batch(&request).await? {
+                Some(response) => return self.read_batch(response, request, sink).await,
+                None => self.inner.takes_no_batches.store(true, Ordering::Relaxed),
+            }
+        }
+        for part in parts {
+            self.stream_range(part.offset, u64::from(part.bytes), sink).await?;
+        }
+        Ok(())
+    }
+
+    /// `None` where the answer is not of a host that takes batches.
+    async fn ask_for_batch(&self, request: &BatchRequest) -> Result<Option<Response>, SourceError> {
+        let body = request.encode().map_err(|e| self.permanent(e.to_string()))?;
+        let mut url = self.inner.url.clone();
+        url.set_path(&format!("{}/batch", url.path()));
+        let client = self.inner.connector.client().map_err(|why| self.permanent(why))?;
+        let post = client.post(url).header(header::CONTENT_TYPE, BATCH_REQUEST_TYPE);
+        let response = post.body(body).send().await.map_err(|e| self.classify(&e))?;
+        let status = response.status();
+        match status {
+            StatusCode::OK => {
+                let content_type = response.headers().get(header::CONTENT_TYPE);
+                return Ok(content_type.is_some_and(|t| t == BATCH_TYPE).then_some(response));
+            }
+            StatusCode::PRECONDITION_FAILED => return Err(self.changed()),
+            StatusCode::RANGE_NOT_SATISFIABLE => {
+                return Err(self.permanent("a part is beyond the end of the file: cut short"));
+            }
+            StatusCode::REQUEST_TIMEOUT | StatusCode::TOO_EARLY | StatusCode::TOO_MANY_REQUESTS => {
+            }
+            StatusCode::NOT_IMPLEMENTED => return Ok(None),
+            _ if status.is_server_error() => {}
+            _ => return Ok(None),
+        }
+        Err(self.transient(format!("the host answered {status}")))
+    }
+
+    async fn read_batch(
+        &self,
+        mut response: Response,
+        request: BatchRequest,
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<(), SourceError> {
+        let mut decoder = BatchDecoder::new(request);
+        while let Some(mut piece) = response.chunk().await.map_err(|e| self.classify(&e))? {
+            while !piece.is_empty() {
+                let step = decoder.step(&piece).map_err(|e| self.transient(e.to_string()))?;
+                let bytes = piece.split_to(step.bytes);
+                if step.is_payload {
+                    sink(bytes);
+                }
+            }
+        }
+        if decoder.is_complete() { Ok(()) } else { Err(self.transient("the answer broke off")) }
     }
 
     pub(super) async fn size(&self) -> Result<u64, SourceError> {
@@ -231,6 +323,9 @@ impl HttpSource {
         if first.differs_from(&found) {
             return Err(self.changed());
         }
+        if let Some(offer) = Offer::read(headers) {
+            self.inner.batches.get_or_init(|| offer);
+        }
         Ok(())
     }
 
@@ -256,9 +351,9 @@ impl HttpSource {
                 ask.offset,
                 ask.offset + ask.len
             )),
-            StatusCode::NOT_FOUND | StatusCode::GONE => {
-                self.permanent(format!("not found ({status}); check the address"))
-            }
+            StatusCode::NOT_FOUND | StatusCode::GONE => self.permanent(format!(
+                "not found ({status}); check the address, and the token or link if it needs one"
+            )),
             StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN => {
                 self.permanent(format!("access denied ({status})"))
             }
@@ -309,6 +404,34 @@ impl Identity {
             None => self.modified.as_ref().zip(other.modified.as_ref()),
         };
         names.is_some_and(|(a, b)| a != b) || totals.is_some_and(|(a, b)| a != b)
+    }
+}
+
+impl Offer {
+    /// `lodestream-batch: 1; parts=COUNT; bytes=COUNT`, beside an entity tag that is the content's
+    /// identity.
+    fn read(headers: &HeaderMap) -> Option<Self> {
+        let offer = headers.get("lodestream-batch")?.to_str().ok()?;
+        let mut fields = offer.split(';').map(str::trim);
+        if fields.next()? != "1" {
+            return None;
+        }
+        let mut limits = BatchLimits { parts: 1, bytes: 0 };
+        for (name, value) in fields.filter_map(|field| field.split_once('=')) {
+            match name {
+                "parts" => limits.parts = value.parse().ok()?,
+                "bytes" => limits.bytes = value.parse().ok()?,
+                _ => {}
+            }
+        }
+        let limits = BatchLimits {
+            parts: limits.parts.min(MAX_BATCH_PARTS),
+            bytes: limits.bytes.min(MAX_BATCH_BYTES),
+        };
+        let etag = headers.get(header::ETAG)?.to_str().ok()?;
+        let digits = etag.strip_prefix('"')?.strip_suffix('"')?;
+        let id = u128::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 32)?;
+        Some(Self { content_id: id.to_be_bytes(), limits })
     }
 }
 
@@ -366,6 +489,27 @@ mod tests {
         ] {
             assert_eq!(parse(bad), None, "{bad}");
         }
+    }
+
+    #[test]
+    fn an_offer_of_batches_counts_beside_the_identity_of_the_content_only() {
+        let read = |offer: &str, etag: &str| {
+            let fields = [("lodestream-batch", offer), ("etag", etag)];
+            let field = |(name, value): (&'static str, &str)| {
+                (header::HeaderName::from_static(name), value.parse().expect("a value"))
+            };
+            Offer::read(&fields.map(field).into_iter().collect())
+        };
+        let etag = "\"000102030405060708090a0b0c0d0e0f\"";
+        let offer = read("1; parts=10; bytes=1000; more=x", etag).expect("an offer");
+        assert_eq!(offer.limits, BatchLimits { parts: 10, bytes: 1000 });
+        assert_eq!(offer.content_id[..3], [0, 1, 2]);
+        let greedy = read("1; parts=99999999; bytes=99999999999", etag).expect("an offer");
+        assert_eq!(greedy.limits, BatchLimits { parts: MAX_BATCH_PARTS, bytes: MAX_BATCH_BYTES });
+        for (offer, etag) in [("2; parts=10", etag), ("", etag), ("1; parts=x", etag)] {
+            assert_eq!(read(offer, etag), None, "{offer}");
+        }
+        assert_eq!(read("1; parts=10; bytes=1000", "\"x\""), None);
     }
 
     #[test]

@@ -16,10 +16,12 @@ mod link;
 mod linked;
 mod listing;
 mod locator;
+mod token;
 
 use std::sync::Arc;
 
 use bytes::{Bytes, BytesMut};
+use lodestream_protocol::BatchPart;
 
 pub use backoff::Backoff;
 pub use blocking::BlockingSource;
@@ -31,6 +33,7 @@ pub use http::HttpSource;
 pub use link::{Link, LinkSpec};
 pub use linked::LinkedSource;
 pub use listing::{datasets_of_folder, is_server, list_datasets};
+pub use token::use_token;
 
 /// Most bytes that are reserved before any of them has arrived.
 const RESERVE_BYTES: u64 = 4 << 20;
@@ -65,6 +68,15 @@ pub struct Announced {
     pub len: u64,
     /// Length of the whole file in bytes, where the host tells.
     pub total: Option<u64>,
+}
+
+/// What a host that takes requests for many parts takes at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BatchLimits {
+    /// Most parts.
+    pub parts: usize,
+    /// Most bytes of all parts together.
+    pub bytes: u64,
 }
 
 impl Source {
@@ -141,6 +153,34 @@ impl Source {
             Self::File(source) => source.stream_range(offset, len, sink).await,
             Self::Linked(source) => source.stream_range(offset, len, sink).await,
         }
+    }
+
+    /// What may be asked for by one request, where the host has offered to take many parts.
+    #[must_use]
+    pub fn batch_limits(&self) -> Option<BatchLimits> {
+        match self {
+            Self::Http(source) => source.batch_limits(),
+            Self::File(_) | Self::Linked(_) => None,
+        }
+    }
+
+    /// Hands the bytes of `parts`, one after the other, to `sink` as they arrive: by one request where
+    /// the host [takes such](Self::batch_limits), else by one for each.
+    ///
+    /// # Errors
+    /// As for [`stream_range`](Self::stream_range).
+    pub async fn stream_parts(
+        &self,
+        parts: &[BatchPart],
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<(), SourceError> {
+        if let Self::Http(source) = self {
+            return source.stream_parts(parts, sink).await;
+        }
+        for part in parts {
+            self.stream_range(part.offset, u64::from(part.bytes), sink).await?;
+        }
+        Ok(())
     }
 
     /// Exactly `len` bytes from `offset`.

@@ -212,6 +212,9 @@ async fn read_request(stream: &mut TcpStream) -> Option<Option<(u64, u64)>> {
         head.push(stream.read_u8().await.ok()?);
     }
     let head = String::from_utf8(head).ok()?.to_ascii_lowercase();
+    // The body of a batch request.
+    let body = head.lines().find_map(|line| line.strip_prefix("content-length: ")?.parse().ok());
+    stream.read_exact(&mut vec![0; body.unwrap_or(0)]).await.ok()?;
     let range = head.lines().find_map(|line| {
         let (first, last) = line.strip_prefix("range: bytes=")?.trim().split_once('-')?;
         Some((first.parse().ok()?, last.parse::<u64>().ok()? + 1))

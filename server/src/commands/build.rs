@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf, process::ExitCode};
 
 use clap::{Args, ValueEnum};
 use indicatif::{BinaryBytes, HumanCount};
-use lodestream_preprocess::{self as preprocess, BuildConfig, BuildReport};
+use lodestream_preprocess::{self as preprocess, BuildConfig, BuildReport, preview::write_preview};
 
 use super::{TerminalProgress, cancel_on_interrupt, parse_size, print, write_report};
 
@@ -34,6 +34,9 @@ pub struct BuildArgs {
     /// Write what was done, in figures, to this file as JSON
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
+    /// Draw no picture for lists of datasets beside the dataset (NAME.preview.png)
+    #[arg(long)]
+    pub no_preview: bool,
     /// Attributes to leave out
     #[arg(long, value_name = "ATTR,…", value_delimiter = ',')]
     pub drop: Vec<String>,
@@ -86,6 +89,12 @@ pub fn run(args: BuildArgs) -> anyhow::Result<ExitCode> {
     let progress = TerminalProgress::default();
     let report = preprocess::build(&config, &progress)?;
     progress.finish();
+    if !args.no_preview {
+        // The dataset is complete without it.
+        if let Err(e) = write_preview(&config.output) {
+            eprintln!("warning: no preview was drawn: {e}");
+        }
+    }
     if let Some(path) = &args.report {
         write_report(path, &report)?;
     }

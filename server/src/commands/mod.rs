@@ -5,7 +5,11 @@
 
 pub mod build;
 pub mod inspect;
+pub mod ping;
+pub mod preview;
 pub mod serve;
+pub mod sign;
+pub mod token;
 pub mod verify;
 
 mod interrupt;
@@ -19,7 +23,7 @@ use anyhow::Context;
 use serde::Serialize;
 
 pub use interrupt::cancel_on_interrupt;
-pub use logging::log_to_stderr;
+pub use logging::log_to_stderr_as;
 pub use progress::TerminalProgress;
 pub use size::parse_size;
 

@@ -1,4 +1,4 @@
-//! Whether the server can do its work.
+//! Whether the server lives, and whether it can do its work.
 
 use std::sync::Arc;
 
@@ -6,11 +6,22 @@ use axum::{extract::State, http::StatusCode, response::IntoResponse};
 
 use super::{Refusal, Site};
 
-/// `GET /healthz`: `ok` while the folder can be read, else `503`.
-pub(super) async fn health(State(site): State<Arc<Site>>) -> impl IntoResponse {
-    let listing = tokio::task::spawn_blocking(move || site.folder.file_names());
-    match listing.await {
-        Ok(Ok(_)) => Ok("ok\n"),
-        _ => Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the folder cannot be read")),
+/// `GET /healthz`: `ok` for as long as the server answers at all. Nothing else is looked at: a
+/// supervisor that restarts the server because a disk is away would not bring the disk back.
+pub(super) async fn health() -> impl IntoResponse {
+    "ok\n"
+}
+
+/// `GET /readyz`: `ok` while the datasets can be listed and the server is not about to stop, else
+/// `503`: whoever spreads requests over several servers sends this one none.
+pub(super) async fn readiness(State(site): State<Arc<Site>>) -> impl IntoResponse {
+    if site.is_draining() {
+        return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the server is about to stop"));
+    }
+    match site.storage.list().await {
+        Ok(_) => Ok("ok\n"),
+        Err(_) => {
+            Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the datasets cannot be listed"))
+        }
     }
 }

@@ -1,84 +1,181 @@
 //! What the server answers, one file per resource.
 
+mod batch;
+mod compressed;
 mod dataset;
+mod figures;
+mod guard;
 mod health;
 mod list;
+mod options;
 mod page;
+mod preview;
 
 use std::{
-    sync::Arc,
-    time::{Duration, Instant},
+    net::IpAddr,
+    sync::{
+        Arc, PoisonError, RwLock,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
 };
 
 use axum::{
     Router,
-    extract::Request,
-    http::{HeaderName, HeaderValue, Method, StatusCode, header},
-    middleware::{self, Next},
+    http::{HeaderName, Method, StatusCode, header},
+    middleware,
     response::{IntoResponse, Response},
     routing::get,
 };
 use tower_http::{
     cors::{Any, CorsLayer},
+    limit::RequestBodyLimitLayer,
     timeout::TimeoutLayer,
 };
 
 use crate::{
+    access::{Access, Rights},
     buffers::BufferPool,
     config::ServeConfig,
     error::Result,
-    folder::Folder,
+    file::{DatasetFile, OpenError},
     index::{DatasetIndex, IndexCache},
+    metrics::Metrics,
+    observe::observe,
     offload::Offload,
+    openapi,
+    private_copy::PrivateCopies,
+    rate::RateLimiter,
+    storage::{SWEEP_INTERVAL, Storage},
 };
+
+use self::compressed::compressed;
+
+pub(crate) use batch::{OFFER as BATCH_OFFER, reaches_beyond, segments as batch_segments};
+pub(crate) use dataset::cache_control;
 
 /// What all requests share.
 #[derive(Debug)]
 pub(crate) struct Site {
-    folder: Folder,
+    storage: Arc<Storage>,
     index: IndexCache,
-    buffers: Arc<BufferPool>,
+    pub(crate) buffers: Arc<BufferPool>,
+    pub(crate) private_copies: Arc<PrivateCopies>,
     offload: Offload,
+    access: RwLock<Arc<Access>>,
+    rate: Option<RateLimiter>,
+    is_draining: AtomicBool,
+    pub(crate) trusted_proxies: Vec<IpAddr>,
+    pub(crate) access_log: bool,
+    pub(crate) metrics: Metrics,
 }
 
 impl Site {
     pub(crate) fn open(config: &ServeConfig) -> Result<Arc<Self>> {
+        let metrics = Metrics::new();
         Ok(Arc::new(Self {
-            folder: Folder::open(config.dir.clone())?,
+            storage: Arc::new(Storage::open(config, &metrics.storage)?),
             index: IndexCache::default(),
             buffers: Arc::default(),
+            private_copies: Arc::default(),
             offload: Offload::new(),
+            access: RwLock::new(Arc::new(config.access.clone())),
+            rate: config.rate.map(RateLimiter::new),
+            is_draining: AtomicBool::new(false),
+            trusted_proxies: config.trusted_proxies.clone(),
+            access_log: config.access_log,
+            metrics,
         }))
     }
 
-    /// Reads the folder, off the runtime's threads.
-    async fn read_index(self: Arc<Self>) -> Result<DatasetIndex, Refusal> {
-        let reading = tokio::task::spawn_blocking(move || self.index.read(&self.folder));
-        reading.await.map_err(std::io::Error::other).flatten().map_err(|e| {
-            tracing::warn!("cannot read the folder of datasets: {e}");
-            Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the folder of datasets cannot be read")
-        })
+    /// Whether plain ranges may go the short way, past all layers: only where none of them has
+    /// anything to do with a request.
+    pub(crate) fn has_short_way(&self) -> bool {
+        let is_open = matches!(*self.access(), Access::Open);
+        is_open && self.rate.is_none() && !self.access_log
+    }
+
+    /// The dataset's file.
+    pub(crate) async fn dataset(&self, file_name: &str) -> Result<Arc<DatasetFile>, OpenError> {
+        self.storage.dataset(file_name, &self.offload).await
+    }
+
+    /// The rules in force.
+    fn access(&self) -> Arc<Access> {
+        Arc::clone(&self.access.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    pub(crate) fn set_access(&self, access: Access) {
+        *self.access.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(access);
+    }
+
+    /// From now on the server is not ready for further clients.
+    pub(crate) fn begin_drain(&self) {
+        self.is_draining.store(true, Ordering::Relaxed);
+    }
+
+    fn is_draining(&self) -> bool {
+        self.is_draining.load(Ordering::Relaxed)
+    }
+
+    /// Lets go of files that nobody asks for any more, now and then; never ends.
+    pub(crate) async fn sweep(self: Arc<Self>) {
+        loop {
+            tokio::time::sleep(SWEEP_INTERVAL).await;
+            self.storage.sweep().await;
+        }
+    }
+
+    /// What there is for whoever has these rights.
+    async fn read_index(&self, rights: &Rights) -> Result<DatasetIndex, Refusal> {
+        let mut index = self.index.read(&self.storage).await.map_err(|e| {
+            tracing::warn!("cannot list the datasets: {e}");
+            Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the datasets cannot be listed")
+        })?;
+        index.keep_readable(rights);
+        Ok(index)
     }
 }
 
 /// All routes over a site.
-pub(crate) fn router(site: Arc<Site>, response_timeout: Duration) -> Router {
-    Router::new()
-        .route("/", get(page::page))
-        .route("/datasets", get(list::list))
+pub(crate) fn router(site: Arc<Site>, config: &ServeConfig) -> Router {
+    // Whatever is asked of one dataset belongs here: a route with a `{file}`, behind the guard.
+    let of_datasets = Router::new()
         .route("/datasets/{file}", get(dataset::dataset))
-        .route("/healthz", get(health::health))
+        .route("/datasets/{file}/batch", batch::route())
+        .route("/datasets/{file}/preview.png", get(preview::preview))
         .route("/{file}", get(dataset::dataset))
+        .route("/{file}/batch", batch::route())
+        .route_layer(middleware::from_fn_with_state(Arc::clone(&site), guard::may_read));
+    Router::new()
+        .route("/", compressed(get(page::page)))
+        .route("/datasets", compressed(get(list::list)))
+        .route("/openapi.json", compressed(get(openapi::document)))
+        .route("/healthz", get(health::health))
+        .route("/readyz", get(health::readiness))
+        .route("/metrics", get(figures::figures))
+        .merge(of_datasets)
         .fallback(async || Refusal::new(StatusCode::NOT_FOUND, "nothing here; see /datasets"))
-        .with_state(site)
-        .layer(TimeoutLayer::with_status_code(StatusCode::GATEWAY_TIMEOUT, response_timeout))
+        .with_state(Arc::clone(&site))
+        .layer(RequestBodyLimitLayer::new(config.max_body_bytes))
+        .layer(TimeoutLayer::with_status_code(StatusCode::GATEWAY_TIMEOUT, config.response_timeout))
+        .layer(middleware::from_fn_with_state(Arc::clone(&site), guard::admit))
         .layer(cross_origin())
-        .layer(middleware::from_fn(log_request))
+        .layer(middleware::from_fn(options::options))
+        .layer(middleware::from_fn_with_state(site, observe))
 }
 
-/// Datasets are public: any page may read them, and see the fields that range clients need.
+/// What the CORS layer adds to every answer, for the answers that it does not see.
+pub(crate) const CROSS_ORIGIN_FIELDS: &str = "access-control-allow-origin: *\r\n\
+     access-control-expose-headers: lodestream-batch,accept-ranges,content-length,content-range,etag,\
+     last-modified\r\n";
+
+/// Any page may read what its user may, and see the fields that range clients need. Rights come from
+/// what the page itself sends, never from cookies.
 fn cross_origin() -> CorsLayer {
-    const ASKED: [HeaderName; 6] = [
+    const ASKED: [HeaderName; 8] = [
+        header::AUTHORIZATION,
+        header::CONTENT_TYPE,
         header::RANGE,
         header::IF_RANGE,
         header::IF_MATCH,
@@ -86,7 +183,8 @@ fn cross_origin() -> CorsLayer {
         header::IF_MODIFIED_SINCE,
         header::IF_UNMODIFIED_SINCE,
     ];
-    const TOLD: [HeaderName; 5] = [
+    const TOLD: [HeaderName; 6] = [
+        dataset::BATCH_OFFER,
         header::ACCEPT_RANGES,
         header::CONTENT_LENGTH,
         header::CONTENT_RANGE,
@@ -95,33 +193,16 @@ fn cross_origin() -> CorsLayer {
     ];
     CorsLayer::new()
         .allow_origin(Any)
-        .allow_methods([Method::GET, Method::HEAD])
+        .allow_methods([Method::GET, Method::HEAD, Method::POST])
         .allow_headers(ASKED)
         .expose_headers(TOLD)
         .max_age(Duration::from_secs(24 * 60 * 60))
 }
 
-/// One line per request, at level `debug`; the time is that until the response starts.
-async fn log_request(request: Request, next: Next) -> Response {
-    if !tracing::enabled!(tracing::Level::DEBUG) {
-        return next.run(request).await;
-    }
-    let (method, uri) = (request.method().clone(), request.uri().clone());
-    let range = request.headers().get(header::RANGE).cloned();
-    let start = Instant::now();
-    let response = next.run(request).await;
-    let text = |field: Option<&HeaderValue>| {
-        field.and_then(|value| value.to_str().ok()).unwrap_or("-").to_owned()
-    };
-    tracing::debug!(
-        "{method} {} {} {} {} bytes {:.2} ms",
-        uri.path(),
-        text(range.as_ref()),
-        response.status().as_u16(),
-        text(response.headers().get(header::CONTENT_LENGTH)),
-        start.elapsed().as_secs_f64() * 1e3,
-    );
-    response
+/// There is no such dataset; or not for whoever asks, which nobody can tell from this.
+fn missing(file_name: &str) -> Refusal {
+    let line = format!("no dataset file {file_name:?} here; /datasets lists all");
+    Refusal::new(StatusCode::NOT_FOUND, line)
 }
 
 /// A response that is one line of text.
@@ -142,6 +223,8 @@ impl IntoResponse for Refusal {
         let fields = [
             (header::CONTENT_TYPE, "text/plain; charset=utf-8"),
             (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+            // What is not there may be a moment later.
+            (header::CACHE_CONTROL, "no-store"),
         ];
         (self.status, fields, format!("{}\n", self.line)).into_response()
     }

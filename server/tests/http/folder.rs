@@ -14,6 +14,8 @@ async fn index(site: &Site) -> DatasetIndex {
 async fn the_index_tells_what_datasets_hold() {
     let (site, bytes) = Site::with_dataset();
     let json = site.json("/datasets").await;
+    let modified = json["datasets"][0]["modified"].as_str().expect("a time");
+    assert!(modified.len() == 20 && modified.ends_with('Z'), "{modified}");
     let header = lodestream_protocol::Header::parse(&bytes).expect("a sound header");
     assert_eq!(
         json,
@@ -21,6 +23,7 @@ async fn the_index_tells_what_datasets_hold() {
             "datasets": [{
                 "name": "a",
                 "url": "datasets/a.lods",
+                "content_url": format!("datasets/a.lods?v={}", header.content_id_hex()),
                 "points": 0,
                 "bytes": bytes.len(),
                 "levels": 0,
@@ -28,6 +31,8 @@ async fn the_index_tells_what_datasets_hold() {
                 "attributes": [
                     { "name": "color", "type": "u8", "components": 3, "constant": false },
                 ],
+                "modified": modified,
+                "preview": null,
                 "content_id": header.content_id_hex(),
             }],
             "unreadable": [],
@@ -123,12 +128,13 @@ async fn a_file_cut_short_under_a_response_breaks_that_response_only() {
 }
 
 #[tokio::test]
-async fn health_is_that_of_the_folder() {
+async fn readiness_is_that_of_the_folder() {
     let site = Site::new();
-    let response = site.get("/healthz", &[]).await;
+    let response = site.get("/readyz", &[]).await;
     assert_eq!(response.status(), 200);
     assert_eq!(response.text().await.expect("a body"), "ok\n");
     fs::remove_dir(site.folder.path()).expect("empty");
-    assert_eq!(site.get("/healthz", &[]).await.status(), 503);
+    assert_eq!(site.get("/readyz", &[]).await.status(), 503);
+    assert_eq!(site.get("/healthz", &[]).await.status(), 200);
     assert_eq!(site.get("/datasets", &[]).await.status(), 503);
 }

@@ -36,7 +36,7 @@ use crate::source::{Backoff, Connections, Source, SourceError};
 
 use self::{
     cloud::Cloud,
-    coalesce::Wanted,
+    coalesce::{Run, Wanted},
     decode::Decoded,
     flight::{Flight, FlightId},
     open::Opening,
@@ -364,8 +364,8 @@ impl Loader {
         self.take_from_prefixes(now);
         let free = self.config.requests_in_flight.max(1).saturating_sub(self.flights.len());
         if free > 0 && self.pieces.backlog_bytes() <= MAX_BACKLOG_BYTES {
-            for run in self.runs(now).into_iter().take(free) {
-                self.start_flight(run);
+            for (pieces, is_batch) in self.runs(now).into_iter().take(free) {
+                self.start_flight(pieces, is_batch);
             }
             if self.config.paces {
                 self.wait_for_turns();
@@ -406,8 +406,9 @@ impl Loader {
         }
     }
 
-    /// The requests that the demand comes to, most important first.
-    fn runs(&self, now: Instant) -> Vec<Vec<Piece>> {
+    /// The requests that the demand comes to, most important first: their pieces, and whether they name
+    /// each.
+    fn runs(&self, now: Instant) -> Vec<(Vec<Piece>, bool)> {
         let mut wanted: BTreeMap<usize, Vec<Wanted>> = BTreeMap::new();
         // What matters less does not ride along while what matters more waits.
         let mut allowed: HashMap<usize, u64> = HashMap::new();
@@ -428,14 +429,20 @@ impl Loader {
                 wanted.push(Wanted { rank, offset: piece.offset, len: piece.len, alone });
             }
         }
-        let coalesced =
-            wanted.into_values().flat_map(|w| coalesce::coalesce(w, self.config.coalesce));
-        let mut runs: Vec<_> = coalesced.collect();
-        runs.sort_by_key(|run| run.rank());
-        let pieces = runs
-            .iter()
-            .map(|run| run.parts.iter().map(|part| self.demand[part.rank].clone()).collect());
-        pieces.collect()
+        let requests = |(index, wanted): (usize, Vec<Wanted>)| {
+            let limits = self.clouds.get(&index).and_then(|cloud| cloud.source.batch_limits());
+            match limits.filter(|_| self.config.batches) {
+                Some(limits) => coalesce::batch(wanted, limits, self.config.coalesce.span_bytes),
+                None => coalesce::coalesce(wanted, self.config.coalesce),
+            }
+        };
+        let mut runs: Vec<Run> = wanted.into_iter().flat_map(requests).collect();
+        runs.sort_by_key(Run::rank);
+        let pieces = |run: &Run| {
+            let pieces = run.parts.iter().map(|part| self.demand[part.rank].clone());
+            (pieces.collect(), run.is_batch)
+        };
+        runs.iter().map(pieces).collect()
     }
 
     /// Bytes that a cloud's requests in flight have still to bring.
@@ -463,7 +470,7 @@ impl Loader {
         }
     }
 
-    fn start_flight(&mut self, pieces: Vec<Piece>) {
+    fn start_flight(&mut self, pieces: Vec<Piece>, is_batch: bool) {
         let Some(first) = pieces.first() else { return };
         let Some(cloud) = self.clouds.get(&first.id.node.cloud) else { return };
         let (source, delivered) = (cloud.source.clone(), Arc::clone(&cloud.delivered));
@@ -474,7 +481,7 @@ impl Loader {
         }
         let shared = Arc::clone(&self.shared);
         let sender = self.sender.clone();
-        let flight = Flight::start(id, source, pieces, shared, sender, delivered);
+        let flight = Flight::start(id, source, pieces, is_batch, shared, sender, delivered);
         self.flights.insert(id, flight);
     }
 

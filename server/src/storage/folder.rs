@@ -10,6 +10,7 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
+use super::Listing;
 use crate::error::{Error, Result};
 
 /// What the name of a dataset's file ends in.
@@ -25,30 +26,28 @@ impl Folder {
     /// Checks that the folder can be read.
     pub(crate) fn open(dir: PathBuf) -> Result<Self> {
         let folder = Self { dir };
-        match folder.file_names() {
+        match folder.list() {
             Ok(_) => Ok(folder),
             Err(source) => Err(Error::Folder { dir: folder.dir, source }),
         }
     }
 
-    /// Names of the files that may be datasets, sorted.
-    pub(crate) fn file_names(&self) -> io::Result<Vec<String>> {
-        let mut names = Vec::new();
-        for entry in std::fs::read_dir(&self.dir)? {
-            // A name that is not Unicode has no address.
-            if let Ok(name) = entry?.file_name().into_string()
-                && dataset_name(&name).is_some()
-            {
-                names.push(name);
-            }
-        }
-        names.sort_unstable();
-        Ok(names)
+    /// What the folder holds.
+    pub(super) fn list(&self) -> io::Result<Listing> {
+        let entries = std::fs::read_dir(&self.dir)?;
+        // A name that is not Unicode has no address.
+        let names = entries.map(|entry| Ok(entry?.file_name().into_string().unwrap_or_default()));
+        Ok(Listing::of(names.collect::<io::Result<Vec<_>>>()?))
     }
 
     /// Where the file of that name would be; `None` where no dataset can be called that.
     pub(crate) fn path_of(&self, file_name: &str) -> Option<PathBuf> {
         dataset_name(file_name).map(|_| self.dir.join(file_name))
+    }
+
+    /// Where a file is that lies beside a dataset; its name is made from the dataset's.
+    pub(super) fn beside(&self, file_name: &str) -> PathBuf {
+        self.dir.join(file_name)
     }
 }
 

@@ -1,0 +1,117 @@
+//! The short way for what a server of datasets is asked nearly always: one range of one file, or a batch,
+//! over HTTP/1.1 and without conditions.
+//!
+//! Such a request is read, answered and forgotten here, by a handful of system calls; the first other
+//! one of a connection, and all after it, go the long way through hyper and axum. Both ways give the
+//! same answer to the letter (a test holds them to it). Only this way can have the system send a file's
+//! pages themselves (`sendfile`), from a [private copy](crate::private_copy).
+//!
+//! The server's processor time for each request, µs, beside nginx 1.22 (`sendfile`, no access log), on two
+//! shared cores, 16 connections, medians of two rounds: 10.6 (nginx 15) for 4 KiB, 17.7 (22.4) for 64
+//! KiB, 35 (60) for 256 KiB, 107-157 (134) for 1 MiB. The long way with copied bytes took 13.5, 20 and,
+//! for 1 MiB, 230 when nginx took 13, 18 and 60.
+
+mod answer;
+mod head;
+mod send;
+
+use std::{io, sync::Arc};
+
+use bytes::{Buf, BytesMut};
+use tokio::{
+    net::TcpStream,
+    sync::watch,
+    time::{Instant, timeout_at},
+};
+
+use self::{
+    answer::Answer,
+    head::{Head, Wanted},
+};
+use crate::{connection::ConnectionLimits, metrics::Answered, routes::Site, storage::dataset_name};
+
+/// What a client may send that is no whole head before the long way takes over.
+const MAX_HEAD_BYTES: usize = 4 << 10;
+
+/// Answers requests for as long as they go this way. Returns what was read of one that does not;
+/// nothing where the connection has ended.
+pub(crate) async fn serve(
+    stream: &TcpStream,
+    site: &Arc<Site>,
+    limits: ConnectionLimits,
+    mut stopping: watch::Receiver<bool>,
+) -> Option<BytesMut> {
+    let mut bytes = BytesMut::new();
+    let mut reply = Vec::new();
+    loop {
+        // For the whole request, and for the pause before it: a client that sends a byte now and then
+        // does not get more.
+        let deadline = Instant::now() + limits.head_timeout;
+        let (request, body) = loop {
+            match head::read(&bytes) {
+                Head::Short(request, length) => {
+                    let body = match request.wanted {
+                        Wanted::Range(_) => length..length,
+                        Wanted::Batch(bytes) => length..length + bytes,
+                    };
+                    if bytes.len() >= body.end {
+                        break (request, body);
+                    }
+                }
+                Head::Partial if bytes.len() < MAX_HEAD_BYTES => {}
+                Head::Partial | Head::Other => return Some(bytes),
+            }
+            let is_idle = bytes.is_empty();
+            if is_idle {
+                // An idle connection holds no memory.
+                (bytes, reply) = (BytesMut::new(), Vec::new());
+            }
+            let ready = tokio::select! {
+                biased;
+                ready = timeout_at(deadline, stream.readable()) => ready,
+                _ = stopping.wait_for(|stop| *stop), if is_idle => return None,
+            };
+            if !ready.is_ok_and(|ready| ready.is_ok()) {
+                return None;
+            }
+            bytes.reserve(MAX_HEAD_BYTES);
+            match stream.try_read_buf(&mut bytes) {
+                Ok(0) => return None,
+                Ok(_) => {}
+                Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
+                Err(_) => return None,
+            }
+        };
+        // Rules may have come since the connection began.
+        if !site.has_short_way() {
+            return Some(bytes);
+        }
+        let start = Instant::now();
+        let answer = Answer::to(site, &request, &bytes[body.clone()]).await;
+        let Some(answer) = answer else { return Some(bytes) };
+        reply.clear();
+        answer.write_head(&mut reply);
+        let until_first_byte = start.elapsed();
+        let sent = send::send(stream, site, &answer, &reply, limits).await;
+        site.metrics.count(&Answered {
+            dataset: dataset_name(request.file_name).unwrap_or_default(),
+            kind: answer.kind(),
+            status: answer.status(),
+            // What was sent of a broken answer, nobody knows to the byte.
+            bytes: if sent.is_ok() { answer.len() } else { 0 },
+            until_first_byte,
+            until_last_byte: start.elapsed(),
+            is_whole: sent.is_ok(),
+        });
+        bytes.advance(body.end);
+        if let Err(e) = sent {
+            tracing::debug!("{}: response broken off: {e}", answer.file.path.display());
+            return None;
+        }
+        if *stopping.borrow() {
+            return None;
+        }
+        // A client that asks without a pause must not keep others waiting.
+        tokio::task::coop::consume_budget().await;
+    }
+}

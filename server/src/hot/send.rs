@@ -1,0 +1,113 @@
+//! From an answer to the socket.
+//!
+//! Batches are copied: sent as pages, a part of 16 KiB with the head of its frame makes two calls and a
+//! packet of its own, and came to 21 µs of the server's time; copied into pieces with its neighbours, to 7.
+
+use std::{
+    io::{self, IoSlice},
+    ops::Range,
+    sync::Arc,
+};
+
+use tokio::{io::Interest, net::TcpStream, time::timeout};
+
+use super::answer::{Answer, Content};
+use crate::{
+    body::FileBody,
+    connection::ConnectionLimits,
+    private_copy::{self, PrivateCopy},
+    routes::{Site, batch_segments},
+};
+
+/// From this length on, sending pages is less work than copying bytes.
+const SENDFILE_BYTES: u64 = 32 << 10;
+
+/// Sends head and content.
+pub(super) async fn send(
+    stream: &TcpStream,
+    site: &Arc<Site>,
+    answer: &Answer,
+    head: &[u8],
+    limits: ConnectionLimits,
+) -> io::Result<()> {
+    let socket = Socket { stream, limits };
+    let (file, length) = (&answer.file, answer.len());
+    if let Content::Range(range) = &answer.content
+        && length >= SENDFILE_BYTES
+    {
+        match file.private_copy.get() {
+            None => private_copy::count(file, length, &site.private_copies),
+            Some(copy) if copy.is_cached(range) => {
+                return socket.send_pages(copy, head, range.clone()).await;
+            }
+            Some(_) => {}
+        }
+    }
+    let (file, pool) = (Arc::clone(file), Arc::clone(&site.buffers));
+    let body = match &answer.content {
+        Content::Range(range) => FileBody::new(file, range.clone(), pool),
+        Content::Batch(batch) => FileBody::of(file, batch_segments(batch), pool),
+    };
+    socket.send_body(head, body).await
+}
+
+/// The client's end, and its patience.
+#[derive(Clone, Copy)]
+struct Socket<'a> {
+    stream: &'a TcpStream,
+    limits: ConnectionLimits,
+}
+
+impl Socket<'_> {
+    /// Bytes that were read, together with the head.
+    async fn send_body(self, mut head: &[u8], mut body: FileBody) -> io::Result<()> {
+        while let Some(piece) = body.next().await {
+            let piece = piece?;
+            let mut piece = piece.as_ref();
+            while !piece.is_empty() {
+                let sent = if head.is_empty() {
+                    self.stream.try_write(piece)
+                } else {
+                    self.stream.try_write_vectored(&[IoSlice::new(head), IoSlice::new(piece)])
+                };
+                let sent = self.wait(sent).await?;
+                let of_head = sent.min(head.len());
+                head = &head[of_head..];
+                piece = &piece[sent - of_head..];
+            }
+        }
+        Ok(())
+    }
+
+    /// The head, then pages of a file that nobody else can change.
+    async fn send_pages(
+        self,
+        copy: &PrivateCopy,
+        mut head: &[u8],
+        mut range: Range<u64>,
+    ) -> io::Result<()> {
+        while !head.is_empty() {
+            let send = || copy.send_head(self.stream, head);
+            head = &head[self.wait(self.stream.try_io(Interest::WRITABLE, send)).await?..];
+        }
+        while !range.is_empty() {
+            let send = || copy.send_pages(self.stream, &range);
+            let sent = self.wait(self.stream.try_io(Interest::WRITABLE, send)).await?;
+            range.start += sent as u64;
+        }
+        Ok(())
+    }
+
+    /// The bytes that were sent; none, after a while, where there was no room.
+    async fn wait(self, sent: io::Result<usize>) -> io::Result<usize> {
+        match sent {
+            Ok(0) => Err(io::ErrorKind::WriteZero.into()),
+            Err(e) if e.kind() == io::ErrorKind::WouldBlock => {
+                let room = timeout(self.limits.write_timeout, self.stream.writable());
+                room.await.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
+                Ok(0)
+            }
+            other => other,
+        }
+    }
+}

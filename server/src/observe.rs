@@ -1,0 +1,174 @@
+//! Every request is counted, and logged where the operator wants that.
+//!
+//! Both happen when the response ends, not when it begins: only then is known how many bytes the
+//! client took. A log line has the path and the client's address; it never has the query, which may
+//! hold a signature, nor the `Authorization` field.
+
+use std::{
+    net::IpAddr,
+    pin::Pin,
+    sync::Arc,
+    task::{Context, Poll},
+    time::{Duration, Instant},
+};
+
+use axum::{
+    body::Body,
+    extract::{MatchedPath, Request, State},
+    http::{HeaderValue, Method, StatusCode, Uri, Version, header},
+    middleware::Next,
+    response::Response,
+};
+use bytes::Bytes;
+use http_body::{Body as HttpBody, Frame, SizeHint};
+
+use crate::{
+    metrics::{Answered, Kind},
+    peer::Peer,
+    routes::Site,
+};
+
+/// Which dataset a response is from; a response's extension that routes leave for the log and the
+/// figures, on success alone.
+#[derive(Debug, Clone)]
+pub(crate) struct ServedDataset(pub(crate) String);
+
+/// The name of the token that a request came with; likewise.
+#[derive(Debug, Clone)]
+pub(crate) struct Holder(pub(crate) String);
+
+/// Counts and logs.
+pub(crate) async fn observe(
+    State(site): State<Arc<Site>>,
+    route: Option<MatchedPath>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let start = Instant::now();
+    let kind = Kind::of(route.as_ref().map(MatchedPath::as_str));
+    let entry = site.access_log.then(|| Entry::of(&site, &request));
+    let mut response = next.run(request).await;
+    let extensions = response.extensions_mut();
+    let dataset = extensions.remove().map_or_else(String::new, |ServedDataset(name)| name);
+    let holder = extensions.remove().map(|Holder(name)| name);
+    let record = Record {
+        site,
+        entry,
+        kind,
+        dataset,
+        holder,
+        status: response.status(),
+        bytes: 0,
+        start,
+        until_first_byte: start.elapsed(),
+        is_whole: false,
+    };
+    response.map(|body| Body::new(ObservedBody { inner: body, record }))
+}
+
+/// What the log tells of a request.
+#[derive(Debug)]
+struct Entry {
+    client: Option<IpAddr>,
+    method: Method,
+    uri: Uri,
+    version: Version,
+    range: Option<HeaderValue>,
+}
+
+impl Entry {
+    fn of(site: &Site, request: &Request) -> Self {
+        let peer = request.extensions().get::<Peer>();
+        Self {
+            client: peer.map(|peer| peer.client(request.headers(), &site.trusted_proxies)),
+            method: request.method().clone(),
+            uri: request.uri().clone(),
+            version: request.version(),
+            range: request.headers().get(header::RANGE).cloned(),
+        }
+    }
+}
+
+/// What is known of a request and its response; told when it is dropped, which is when the response
+/// has ended in whatever way.
+#[derive(Debug)]
+struct Record {
+    site: Arc<Site>,
+    entry: Option<Entry>,
+    kind: Kind,
+    dataset: String,
+    holder: Option<String>,
+    status: StatusCode,
+    bytes: u64,
+    start: Instant,
+    until_first_byte: Duration,
+    is_whole: bool,
+}
+
+impl Drop for Record {
+    fn drop(&mut self) {
+        let until_last_byte = self.start.elapsed();
+        self.site.metrics.count(&Answered {
+            dataset: &self.dataset,
+            kind: self.kind,
+            status: self.status.as_u16(),
+            bytes: self.bytes,
+            until_first_byte: self.until_first_byte,
+            until_last_byte,
+            is_whole: self.is_whole,
+        });
+        let Some(entry) = &self.entry else { return };
+        let ms = |time: Duration| (time.as_secs_f64() * 1e5).round() / 1e2;
+        tracing::info!(
+            target: "access",
+            client = %entry.client.map_or_else(|| "-".into(), |ip| ip.to_string()),
+            method = %entry.method,
+            path = entry.uri.path(),
+            version = ?entry.version,
+            range = entry.range.as_ref().and_then(|value| value.to_str().ok()),
+            status = self.status.as_u16(),
+            bytes = self.bytes,
+            first_byte_ms = ms(self.until_first_byte),
+            last_byte_ms = ms(until_last_byte),
+            kind = self.kind.name(),
+            token = self.holder.as_deref(),
+            broken = (!self.is_whole).then_some(true),
+        );
+    }
+}
+
+/// A body that counts its bytes.
+#[derive(Debug)]
+struct ObservedBody {
+    inner: Body,
+    record: Record,
+}
+
+impl HttpBody for ObservedBody {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+        match &polled {
+            Poll::Ready(Some(Ok(frame))) => {
+                self.record.bytes += frame.data_ref().map_or(0, |data| data.len() as u64);
+                self.record.is_whole = self.inner.is_end_stream();
+            }
+            Poll::Ready(None) => self.record.is_whole = true,
+            _ => {}
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.inner.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.inner.size_hint()
+    }
+}

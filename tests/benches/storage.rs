@@ -1,0 +1,92 @@
+//! What a dataset in an object store costs beside one on the local disk: milliseconds for ranges, first and again.
+//!
+//! `./dev bench storage [RANGES]`. The object store is a program on this machine (moto, in Python), so that what it
+//! takes itself is in the figures: they are an upper bound of the server's own cost, and real stores add their distance.
+
+#[path = "../tests/hosting/process.rs"]
+#[allow(dead_code, reason = "tests use more of it")]
+mod process;
+#[path = "../tests/hosting/s3.rs"]
+#[allow(dead_code, reason = "tests use more of it")]
+mod s3;
+#[path = "../tests/hosting/server.rs"]
+#[allow(dead_code, reason = "tests use more of it")]
+mod server;
+
+use std::time::Instant;
+
+use process::Process;
+use reqwest::Client;
+
+const RANGE_BYTES: u64 = 64 << 10;
+
+fn main() {
+    let ranges: u64 = std::env::args().skip(1).find_map(|a| a.parse().ok()).unwrap_or(200);
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
+    runtime.expect("a runtime").block_on(measure(ranges));
+}
+
+async fn measure(ranges: u64) {
+    let _ = rustls::crypto::ring::default_provider().install_default();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("a.lods");
+    server::build(&path, "2M", 1);
+    let bytes = std::fs::read(&path).expect("built");
+    let s3 = s3::S3::start().await;
+    s3.put("a.lods", bytes.clone()).await;
+    let (_disk, disk) = server::serve(folder.path().to_str().expect("a plain path"), &[]);
+    let mut command =
+        server::command(&["serve", "s3://bucket", "--listen", "127.0.0.1:0", "--cache", "1GiB"]);
+    command.envs(s3.variables());
+    let (_store, store) = Process::start(command, false, |line| Some(line.to_owned()));
+
+    println!("| ranges of 64 KiB, one at a time | first: median, p99 | again: median, p99 |");
+    println!("| --- | --- | --- |");
+    let mut medians = Vec::new();
+    for (name, url) in [("local disk", &disk), ("object store", &store)] {
+        let first = ask(url, ranges, &bytes).await;
+        let again = ask(url, ranges, &bytes).await;
+        let told = |times: &[f64]| {
+            format!("{:.2}, {:.2} ms", median(times), times[times.len() * 99 / 100])
+        };
+        println!("| {name} | {} | {} |", told(&first), told(&again));
+        medians.push((median(&first), median(&again)));
+    }
+    println!(
+        "object store over local disk: first {:.1}x, again {:.2}x",
+        medians[1].0 / medians[0].0,
+        medians[1].1 / medians[0].1
+    );
+    let figures = Client::new().get(format!("{store}/metrics")).send().await.expect("an answer");
+    let figures = figures.text().await.expect("text");
+    for line in figures
+        .lines()
+        .filter(|l| l.starts_with("lodestream_cache") || l.starts_with("lodestream_store"))
+    {
+        println!("{line}");
+    }
+}
+
+fn median(sorted: &[f64]) -> f64 {
+    sorted[sorted.len() / 2]
+}
+
+/// Milliseconds of each range, sorted.
+async fn ask(url: &str, ranges: u64, bytes: &[u8]) -> Vec<f64> {
+    let client = Client::new();
+    let mut state = 1u64;
+    let mut times = Vec::new();
+    for _ in 0..ranges {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let start = (state >> 20) % (bytes.len() as u64 - RANGE_BYTES);
+        let range = format!("bytes={start}-{}", start + RANGE_BYTES - 1);
+        let began = Instant::now();
+        let response = client.get(format!("{url}/a.lods")).header("range", range).send().await;
+        let body = response.expect("an answer").bytes().await.expect("a body");
+        times.push(began.elapsed().as_secs_f64() * 1e3);
+        assert!(body == bytes[start as usize..(start + RANGE_BYTES) as usize]);
+    }
+    times.sort_by(f64::total_cmp);
+    times
+}
