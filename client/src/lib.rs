@@ -2,8 +2,10 @@
 
 pub mod camera;
 pub mod commands;
+pub mod doctor;
 pub mod engine;
 pub mod eval;
+pub mod load;
 pub mod metrics;
 pub mod path;
 pub mod render;

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use lodestream_client::{
-    commands::{demo, eval, export, shot, stability},
+    commands::{demo, doctor, eval, export, load, shot, stability},
     source::{BlockingSource, Source},
 };
 use lodestream_server::commands::{build, finish, inspect, serve, verify};
@@ -27,6 +27,8 @@ enum Command {
     Shot(shot::ShotArgs),
     Demo(demo::DemoArgs),
     Eval(eval::EvalArgs),
+    Load(load::LoadArgs),
+    Doctor(doctor::DoctorArgs),
     Stability(stability::StabilityArgs),
 }
 
@@ -40,6 +42,8 @@ fn main() -> ExitCode {
         Command::Shot(args) => shot::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Eval(args) => eval::run(args),
+        Command::Load(args) => load::run(args),
+        Command::Doctor(args) => doctor::run(args),
         Command::Stability(args) => stability::run(args),
     })
 }

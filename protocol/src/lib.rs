@@ -26,7 +26,8 @@ pub use boot::{
     BOOT_SPECULATIVE_BYTES, Boot, HEADER_BYTES, Header, MAGIC, VERSION_MAJOR, VERSION_MINOR,
 };
 pub use column::{
-    Column, DecodedGroup, Encoding, decode_group, decode_unchecked, encode_column, encode_positions,
+    Column, DecodedGroup, Encoding, check_group, decode_group, decode_unchecked, encode_column,
+    encode_positions,
 };
 pub use dataset::{Dataset, NodePoints, ReadAt};
 pub use error::{Error, Result};

@@ -11,6 +11,7 @@
 //! engine knows no GPU: whoever draws takes a [`FramePlan`] and reads its nodes.
 
 mod board;
+mod commons;
 mod config;
 mod depth;
 mod drawing;
@@ -28,6 +29,7 @@ mod shared;
 mod simulated;
 mod stats;
 mod store;
+mod tasked;
 mod traversal;
 mod tree;
 mod view;
@@ -37,15 +39,17 @@ use std::{sync::Arc, thread::JoinHandle, time::Duration};
 use lodestream_protocol::Boot;
 
 pub use board::CloudStatus;
-pub use config::{Coalesce, EngineConfig, LoadOrder};
+pub use commons::Commons;
+pub use config::{Coalesce, EngineConfig, LoadOrder, Payloads};
 pub use depth::DepthPyramid;
 pub use error::EngineError;
 pub use occlusion::SplatReach;
-pub use plan::{DrawNode, FramePlan, LeftOut, Tally};
+pub use plan::{DrawNode, FramePlan, LeftOut, Tally, WantedNode};
 pub use policy::Policy;
 pub use priority::Priority;
 pub use simulated::SimulatedEngine;
 pub use stats::{EngineStats, Phase, Totals};
+pub use tasked::TaskedEngine;
 pub use view::View;
 pub(crate) use view::{Optics, WorldBox};
 

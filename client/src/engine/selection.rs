@@ -531,7 +531,7 @@ mod tests {
 
         /// The tree with these pages.
         fn tree<'a>(&self, pages: impl IntoIterator<Item = &'a NodeKey>) -> Vec<Option<Tree>> {
-            let mut tree = Tree::new(Arc::clone(&self.boot));
+            let mut tree = Tree::new(Arc::clone(&self.boot), None);
             pages.into_iter().for_each(|key| tree.add_page(*key, self.pages[key].clone()));
             vec![Some(tree)]
         }
@@ -714,7 +714,7 @@ mod tests {
         let mut huge = forest.boot.as_ref().clone();
         huge.root_page.nodes[0].points = 1_000_000;
         let mut trees = forest.tree(forest.pages.keys());
-        trees.insert(0, Some(Tree::new(Arc::new(huge))));
+        trees.insert(0, Some(Tree::new(Arc::new(huge), None)));
         let limits = LIMITS;
         let optics = optics([128.0, -400.0, 128.0], [128.0; 3], 1.0);
         let selection = selected(&mut trees, &optics, limits, &HashSet::new());

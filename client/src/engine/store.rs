@@ -8,10 +8,13 @@ use std::{
     sync::Arc,
 };
 
-use lodestream_protocol::{DecodedGroup, NodePoints};
+use lodestream_protocol::NodePoints;
 use lru::LruCache;
 
-use super::piece::{NodeId, PieceId};
+use super::{
+    event::Content,
+    piece::{NodeId, PieceId},
+};
 
 /// The groups of a node as bits; manifests hold at most 64.
 pub(super) type GroupMask = u64;
@@ -65,8 +68,8 @@ impl Store {
         }
     }
 
-    /// Adds a decoded group. Call [`pin`](Self::pin) afterwards: until then it counts as cached.
-    pub fn add(&mut self, id: NodeId, group: usize, decoded: DecodedGroup) {
+    /// Adds a group. Call [`pin`](Self::pin) afterwards: until then it counts as cached.
+    pub fn add(&mut self, id: NodeId, group: usize, content: Content) {
         let (resident, total) = if let Some(resident) = self.pinned.get_mut(&id) {
             (resident, &mut self.pinned_bytes)
         } else {
@@ -85,15 +88,20 @@ impl Store {
             return;
         }
         resident.groups |= group_bit(group);
-        // Copies where a plan holds the points: a further group came after the first picture.
-        let points = Arc::make_mut(&mut resident.points);
-        if group == 0 {
-            points.positions = decoded.positions;
-        }
-        points.columns.extend(decoded.columns);
-        points.columns.sort_by_key(|column| column.attribute);
         self.fresh.insert(id);
-        let bytes = size_bytes(points);
+        let bytes = match content {
+            Content::Decoded(decoded) => {
+                // Copies where a plan holds the points: a further group came after the first picture.
+                let points = Arc::make_mut(&mut resident.points);
+                if group == 0 {
+                    points.positions = decoded.positions;
+                }
+                points.columns.extend(decoded.columns);
+                points.columns.sort_by_key(|column| column.attribute);
+                size_bytes(points)
+            }
+            Content::Counted(bytes) => resident.bytes + bytes,
+        };
         *total += bytes - resident.bytes;
         resident.bytes = bytes;
     }
@@ -168,7 +176,7 @@ fn size_bytes(points: &NodePoints) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use lodestream_protocol::{Column, NodeKey};
+    use lodestream_protocol::{Column, DecodedGroup, NodeKey};
 
     use super::*;
 
@@ -177,8 +185,8 @@ mod tests {
     }
 
     /// 12 bytes a point.
-    fn base(points: usize) -> DecodedGroup {
-        DecodedGroup { positions: vec![[1, 2, 3]; points], columns: vec![] }
+    fn base(points: usize) -> Content {
+        Content::Decoded(DecodedGroup { positions: vec![[1, 2, 3]; points], columns: vec![] })
     }
 
     fn store(cache_limit: u64, nodes: u8) -> Store {
@@ -212,16 +220,19 @@ mod tests {
     #[test]
     fn groups_join_in_any_order_and_leave_shared_points_alone() {
         let columns = vec![Column { attribute: 1, bytes: vec![0; 20] }];
-        let further = DecodedGroup { positions: vec![], columns };
+        let further = || {
+            let columns = columns.clone();
+            Content::Decoded(DecodedGroup { positions: vec![], columns })
+        };
         let mut store = Store::new(1000);
-        store.add(id(0), 1, further.clone());
+        store.add(id(0), 1, further());
         assert!(store.points(id(0)).is_none(), "no positions yet");
         store.add(id(0), 0, base(10));
         assert_eq!(store.groups(id(0)), 0b11);
 
         store.add(id(1), 0, base(10));
         let shown = Arc::clone(store.points(id(1)).expect("there"));
-        store.add(id(1), 1, further);
+        store.add(id(1), 1, further());
         assert!(shown.columns.is_empty());
         assert_eq!(store.points(id(1)).expect("there").columns.len(), 1);
         assert_eq!(store.cached_bytes(), 2 * 140);

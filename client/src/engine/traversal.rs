@@ -10,13 +10,14 @@
 use std::{collections::HashSet, sync::Arc};
 
 use super::{
+    commons::Commons,
     config::EngineConfig,
     drawing::{self, Presence},
     event::Event,
     inbox::{Demand, TraversalMail},
     occlusion::{Drawn, Occluders},
     piece::{NodeId, Part, Piece, PieceId},
-    plan::{DrawNode, FramePlan},
+    plan::{DrawNode, FramePlan, WantedNode},
     selection::{self, Limits, Pick, Selection},
     shared::Shared,
     store::{GroupMask, Store, group_bit},
@@ -48,6 +49,10 @@ pub(super) struct Traversal {
     in_sight: HashSet<NodeId>,
     /// What the newest plan draws.
     shown: Vec<NodeId>,
+    /// What the newest plan wants: indices into the selection.
+    needed: Vec<usize>,
+    /// Where other engines may have the same pages.
+    commons: Option<Arc<Commons>>,
     /// Whether everything that the newest plan wants is there.
     is_loaded: bool,
     sequence: u64,
@@ -82,9 +87,32 @@ impl Traversal {
             drawn: None,
             in_sight: HashSet::new(),
             shown: Vec::new(),
+            needed: Vec::new(),
+            commons: None,
             is_loaded: false,
             sequence: 0,
         }
+    }
+
+    /// The same, keeping what is equal in other engines once.
+    pub fn sharing(self, commons: Arc<Commons>) -> Self {
+        Self { commons: Some(commons), ..self }
+    }
+
+    /// What the newest plan wants.
+    pub fn wanted(&self) -> impl Iterator<Item = WantedNode> {
+        self.needed.iter().map(|&i| {
+            let pick = &self.selection.picks[i];
+            let groups = self.clouds[pick.id.cloud].groups;
+            let payloads = pick.node.payloads.iter().enumerate();
+            let wanted = payloads.filter(|(group, _)| groups & group_bit(*group) != 0);
+            WantedNode {
+                cloud: pick.id.cloud,
+                key: pick.id.key,
+                bytes: wanted.map(|(_, payload)| u64::from(payload.bytes)).sum(),
+                is_there: groups & !self.store.groups(pick.id) == 0,
+            }
+        })
     }
 
     /// Runs until the inbox says to end.
@@ -149,7 +177,7 @@ impl Traversal {
         for event in mail.events {
             match event {
                 Event::Opened { cloud, boot } => {
-                    self.trees[cloud] = Some(Tree::new(Arc::clone(&boot)));
+                    self.trees[cloud] = Some(Tree::new(Arc::clone(&boot), self.commons.clone()));
                     self.update_groups(cloud);
                     self.shared.board.post(|news| news.clouds[cloud].boot = Some(boot));
                     reselect = true;
@@ -167,7 +195,7 @@ impl Traversal {
                         reselect = true;
                     }
                 }
-                Event::Group { node, group, decoded } => self.store.add(node, group, decoded),
+                Event::Group { node, group, content } => self.store.add(node, group, content),
                 Event::Lost { piece, message } => {
                     self.store.lose(piece);
                     // Nothing is hidden any more: see `select`.
@@ -224,7 +252,7 @@ impl Traversal {
         for &i in &drawing.drawn {
             let pick = &self.selection.picks[i];
             if let Some(points) = self.store.points(pick.id) {
-                plan.points += points.positions.len() as u64;
+                plan.points += u64::from(pick.node.points);
                 plan.nodes.push(DrawNode {
                     cloud: pick.id.cloud,
                     key: pick.id.key,
@@ -249,6 +277,7 @@ impl Traversal {
             self.trees.iter().zip(&self.clouds).all(|(tree, cloud)| tree.is_some() || cloud.failed);
         self.shown = plan.nodes.iter().map(|n| NodeId { cloud: n.cloud, key: n.key }).collect();
         self.is_loaded = self.view.is_some() && all_open && pieces.is_empty();
+        self.needed = drawing.needed;
         plan.settled = self.is_loaded && self.hides_rightly();
         // Per cloud, so that a host which does not answer keeps nothing from the others.
         let mut bytes = vec![0; self.clouds.len()];

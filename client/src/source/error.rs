@@ -1,5 +1,7 @@
 //! Why a source did not deliver.
 
+use super::Fault;
+
 /// Why bytes could not be had. Variants follow what a caller does next.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SourceError {
@@ -10,6 +12,8 @@ pub enum SourceError {
         place: String,
         /// What happened.
         message: String,
+        /// Its kind.
+        fault: Fault,
     },
     /// Trying again cannot help; the message says what would.
     #[error("{place}: {message}")]
@@ -18,6 +22,8 @@ pub enum SourceError {
         place: String,
         /// What is wrong and what to do.
         message: String,
+        /// Its kind.
+        fault: Fault,
     },
 }
 
@@ -28,11 +34,27 @@ impl SourceError {
         matches!(self, Self::Transient { .. })
     }
 
+    /// The kind of failure.
+    #[must_use]
+    pub const fn fault(&self) -> Fault {
+        match self {
+            Self::Transient { fault, .. } | Self::Permanent { fault, .. } => *fault,
+        }
+    }
+
     pub(super) fn transient(place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self::Transient { place: place.into(), message: message.into() }
+        Self::Transient { place: place.into(), message: message.into(), fault: Fault::Other }
     }
 
     pub(super) fn permanent(place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self::Permanent { place: place.into(), message: message.into() }
+        Self::Permanent { place: place.into(), message: message.into(), fault: Fault::Other }
+    }
+
+    /// The same, of that kind.
+    pub(super) fn of(mut self, kind: Fault) -> Self {
+        match &mut self {
+            Self::Transient { fault, .. } | Self::Permanent { fault, .. } => *fault = kind,
+        }
+        self
     }
 }

@@ -16,7 +16,7 @@ use reqwest::{
     header::{self, HeaderMap},
 };
 
-use super::{Announced, SourceError};
+use super::{Announced, Fault, SourceError, Wire, wire::Trip};
 
 /// How long a host may be silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +47,7 @@ struct Inner {
     url: Url,
     /// The URL without what may be secret.
     place: String,
+    wire: Wire,
     /// Set by the first good answer.
     identity: OnceLock<Identity>,
 }
@@ -89,6 +90,14 @@ impl HttpSource {
     /// # Errors
     /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
     pub fn with_timeouts(url: Url, timeouts: Timeouts) -> Result<Self, SourceError> {
+        Self::by_wire(url, timeouts, Wire::default())
+    }
+
+    /// A source at `url` whose requests go through `wire`. Nothing is asked yet.
+    ///
+    /// # Errors
+    /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
+    pub fn by_wire(url: Url, timeouts: Timeouts, wire: Wire) -> Result<Self, SourceError> {
         // An error means that the process has chosen its provider already: just as good.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let place = without_secrets(&url);
@@ -97,13 +106,18 @@ impl HttpSource {
             .tcp_nodelay(true)
             .connect_timeout(timeouts.connect)
             .read_timeout(timeouts.silence);
-        if is_loopback(&url) {
+        if is_local(&url) {
             builder = builder.no_proxy();
+        }
+        if wire.meter.is_some() && url.scheme() == "http" {
+            // Reading the system's certificates takes 6 ms of processor time: more than all else a
+            // client does until its first picture, and there may be thousands.
+            builder = builder.tls_certs_only([]);
         }
         let client = builder
             .build()
             .map_err(|e| SourceError::permanent(&place, format!("no HTTP client: {e}")))?;
-        Ok(Self { inner: Arc::new(Inner { client, url, place, identity: OnceLock::new() }) })
+        Ok(Self { inner: Arc::new(Inner { client, url, place, wire, identity: OnceLock::new() }) })
     }
 
     /// The URL, with whatever secrets it holds.
@@ -122,8 +136,8 @@ impl HttpSource {
         len: u64,
         sink: &mut (dyn FnMut(Bytes) + Send),
     ) -> Result<(), SourceError> {
-        let (response, range) = self.ask(Ask { offset, len, may_end: false }).await?;
-        self.read_body(response, range.end - range.start, sink).await
+        let ask = Ask { offset, len, may_end: false };
+        self.transfer(ask, &mut |piece, _| sink(piece)).await
     }
 
     pub(super) async fn stream_prefix(
@@ -131,9 +145,28 @@ impl HttpSource {
         len: u64,
         sink: &mut (dyn FnMut(Bytes, Announced) + Send),
     ) -> Result<(), SourceError> {
-        let (response, range) = self.ask(Ask { offset: 0, len, may_end: true }).await?;
-        let announced = Announced { len: range.end - range.start, total: range.total };
-        self.read_body(response, announced.len, &mut |piece| sink(piece, announced)).await
+        self.transfer(Ask { offset: 0, len, may_end: true }, sink).await
+    }
+
+    /// Sends the request and hands on its answer, by the wire.
+    async fn transfer(
+        &self,
+        ask: Ask,
+        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
+    ) -> Result<(), SourceError> {
+        let Some(mut trip) = self.inner.wire.depart(ask.offset).await else {
+            return Err(self.permanent("no more requests may be sent"));
+        };
+        let outcome = match self.ask(ask).await {
+            Ok((response, range)) => {
+                trip.answered().await;
+                let announced = Announced { len: range.end - range.start, total: range.total };
+                self.read_body(response, announced, &mut trip, sink).await
+            }
+            Err(error) => Err(error),
+        };
+        trip.end(outcome.as_ref().map(|()| ()).map_err(SourceError::fault));
+        outcome
     }
 
     pub(super) async fn size(&self) -> Result<u64, SourceError> {
@@ -165,10 +198,9 @@ impl HttpSource {
         if let Some(length) = response.content_length()
             && length != range.end - range.start
         {
-            return Err(self.transient(format!(
-                "the answer is {length} bytes long but announces {}",
-                range.end - range.start
-            )));
+            let announced = range.end - range.start;
+            let wrong = format!("the answer is {length} bytes long but announces {announced}");
+            return Err(self.transient(wrong).of(Fault::WrongRange));
         }
         Ok((response, range))
     }
@@ -176,20 +208,23 @@ impl HttpSource {
     async fn read_body(
         &self,
         mut response: Response,
-        expected: u64,
-        sink: &mut (dyn FnMut(Bytes) + Send),
+        announced: Announced,
+        trip: &mut Trip<'_>,
+        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
     ) -> Result<(), SourceError> {
-        let mut received = 0;
+        let (expected, mut received) = (announced.len, 0);
         while let Some(piece) = response.chunk().await.map_err(|e| self.classify(&e))? {
             received += piece.len() as u64;
             if received > expected {
-                return Err(self.transient(format!("more than the {expected} bytes asked for")));
+                let more = format!("more than the {expected} bytes asked for");
+                return Err(self.transient(more).of(Fault::WrongRange));
             }
-            sink(piece);
+            trip.received(piece.len() as u64).await;
+            sink(piece, announced);
         }
         if received < expected {
-            return Err(self
-                .transient(format!("the answer broke off after {received} of {expected} bytes")));
+            let short = format!("the answer broke off after {received} of {expected} bytes");
+            return Err(self.transient(short).of(Fault::BrokenOff));
         }
         Ok(())
     }
@@ -198,10 +233,12 @@ impl HttpSource {
         let text = headers.get(header::CONTENT_RANGE).and_then(|v| v.to_str().ok());
         let encoding = headers.get(header::CONTENT_ENCODING);
         if encoding.is_some_and(|e| e != "identity") {
-            return Err(self.permanent("the host compresses ranges; switch that off for .lods"));
+            let message = "the host compresses ranges; switch that off for .lods";
+            return Err(self.permanent(message).of(Fault::Compressed));
         }
         let range = text.and_then(ContentRange::parse).ok_or_else(|| {
-            self.transient(format!("the answer announces no usable range ({text:?})"))
+            let message = format!("the answer announces no usable range ({text:?})");
+            self.transient(message).of(Fault::WrongRange)
         })?;
         let wanted = ask.offset + ask.len;
         let complete = range.end == wanted
@@ -210,16 +247,18 @@ impl HttpSource {
             && total < wanted
             && !ask.may_end
         {
-            return Err(self.permanent(format!(
+            let message = format!(
                 "bytes {} to {wanted} are beyond the end of the file ({total} bytes): cut short",
                 ask.offset
-            )));
+            );
+            return Err(self.permanent(message).of(Fault::WrongRange));
         }
         if range.start != ask.offset || !complete {
-            return Err(self.transient(format!(
+            let message = format!(
                 "asked for bytes {} to {wanted}, the answer announces {} to {}",
                 ask.offset, range.start, range.end
-            )));
+            );
+            return Err(self.transient(message).of(Fault::WrongRange));
         }
         Ok(range)
     }
@@ -236,19 +275,23 @@ impl HttpSource {
     /// The error for an answer that is not 206.
     fn refuse(&self, response: &Response, ask: Ask) -> SourceError {
         let status = response.status();
-        match status {
+        let error = match status {
             StatusCode::OK => {
                 let found = Identity { etag: etag(response.headers()), total: None };
-                match self.inner.identity.get() {
+                return match self.inner.identity.get() {
                     Some(first) if first.differs_from(&found) => self.changed(),
                     // It can answer ranges: this was a bad moment, or a proxy's error page.
-                    Some(_) => self.transient("answered a range request with 200 this time"),
-                    None => self.permanent(
-                        "the host answers range requests with the whole file (status 200); nothing \
-                         was downloaded. Use a host or proxy that supports Range, such as \
-                         `lodestream serve`",
-                    ),
-                }
+                    Some(_) => self
+                        .transient("answered a range request with 200 this time")
+                        .of(Fault::WholeFile),
+                    None => self
+                        .permanent(
+                            "the host answers range requests with the whole file (status 200); \
+                             nothing was downloaded. Use a host or proxy that supports Range, such \
+                             as `lodestream serve`",
+                        )
+                        .of(Fault::WholeFile),
+                };
             }
             StatusCode::RANGE_NOT_SATISFIABLE => self.permanent(format!(
                 "bytes {} to {} are beyond the end of the file: it is empty or cut short",
@@ -266,22 +309,28 @@ impl HttpSource {
             }
             _ if status.is_server_error() => self.transient(format!("the host answered {status}")),
             _ => self.permanent(format!("the host answered {status}")),
-        }
+        };
+        error.of(Fault::Status(status.as_u16()))
     }
 
     fn classify(&self, error: &reqwest::Error) -> SourceError {
         if error.is_builder() || error.is_redirect() {
             return self.permanent(innermost(error));
         }
-        let what = if error.is_connect() { "no connection: " } else { "" };
+        let (what, fault) = match error.is_connect() {
+            true => ("no connection: ", Fault::NoConnection),
+            false => ("", Fault::BrokenOff),
+        };
         if error.is_timeout() {
-            return self.transient(format!("{what}the host is silent"));
+            let fault = if error.is_connect() { fault } else { Fault::Silent };
+            return self.transient(format!("{what}the host is silent")).of(fault);
         }
-        self.transient(format!("{what}{}", innermost(error)))
+        self.transient(format!("{what}{}", innermost(error))).of(fault)
     }
 
     fn changed(&self) -> SourceError {
-        self.permanent("the file was replaced while it was in use; open it again")
+        let message = "the file was replaced while it was in use; open it again";
+        self.permanent(message).of(Fault::Replaced)
     }
 
     fn transient(&self, message: impl Into<String>) -> SourceError {
@@ -330,7 +379,9 @@ fn innermost(error: &reqwest::Error) -> String {
     cause.to_string()
 }
 
-fn is_loopback(url: &Url) -> bool {
+/// Whether a URL names this machine by its loopback address.
+#[must_use]
+pub fn is_local(url: &Url) -> bool {
     let host = url.host_str().unwrap_or_default().trim_matches(['[', ']']);
     host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback())
 }

@@ -9,3 +9,4 @@ mod picture;
 mod refinement;
 mod simulated;
 mod sources;
+mod tasked;

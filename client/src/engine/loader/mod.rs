@@ -22,6 +22,7 @@ use bytes::Bytes;
 use lodestream_protocol::{Boot, Error};
 use tokio::{
     sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel},
+    task::JoinSet,
     // Its clock can be a simulated one.
     time::Instant,
 };
@@ -37,6 +38,7 @@ use self::{
     pieces::{PieceState, Pieces},
 };
 use super::{
+    commons::Commons,
     config::{EngineConfig, LoadOrder},
     event::Event,
     inbox::Demand,
@@ -120,6 +122,8 @@ pub(super) struct Loader {
     next_flight: FlightId,
     /// Decode at once, on this thread: simulated time must not pass meanwhile.
     decode_inline: bool,
+    /// Where other engines may have the same index.
+    commons: Option<Arc<Commons>>,
     sender: UnboundedSender<Message>,
     receiver: UnboundedReceiver<Message>,
 }
@@ -149,6 +153,7 @@ impl Loader {
             flights: HashMap::new(),
             next_flight: 0,
             decode_inline: false,
+            commons: None,
             sender,
             receiver,
         }
@@ -159,13 +164,20 @@ impl Loader {
         Self { decode_inline: true, ..self }
     }
 
+    /// The same, keeping what is equal in other engines once.
+    pub fn sharing(self, commons: Arc<Commons>) -> Self {
+        Self { commons: Some(commons), ..self }
+    }
+
     /// Runs until the inbox says to end.
     pub async fn run(mut self) {
+        // Broken off when they are dropped, as flights are.
+        let mut openings = JoinSet::new();
         for cloud in 0..self.clouds.len() {
             let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
             let source = self.clouds[cloud].source.clone();
             let speculative = self.config.speculative_bytes;
-            tokio::spawn(async move {
+            openings.spawn(async move {
                 // The loader outlives its tasks, save when it shuts down.
                 let tell = |opening| _ = sender.send(Message::Opening { cloud, opening });
                 let result = open::open(&shared, cloud, &source, speculative, tell).await;
@@ -268,11 +280,19 @@ impl Loader {
 
     fn take_opening(&mut self, cloud: usize, opening: Opening) {
         let known = &mut self.clouds[cloud];
-        known.prefix = opening.prefix;
+        let is_whole = opening.prefix.len() as u64 >= opening.expected;
+        known.prefix = match &self.commons {
+            Some(commons) if is_whole => commons.prefix(&opening.boot, opening.prefix),
+            _ => opening.prefix,
+        };
         known.prefix_end = opening.expected;
         if known.boot.is_none() {
-            known.boot = Some(Arc::clone(&opening.boot));
-            self.shared.traversal.post(Event::Opened { cloud, boot: opening.boot });
+            let boot = match &self.commons {
+                Some(commons) => commons.boot(opening.boot),
+                None => opening.boot,
+            };
+            known.boot = Some(Arc::clone(&boot));
+            self.shared.traversal.post(Event::Opened { cloud, boot });
         }
     }
 
@@ -280,9 +300,13 @@ impl Loader {
         let Some(boot) = self.clouds[piece.id.node.cloud].boot.clone() else { return };
         let size = decode::decoded_bytes(&piece, &boot.manifest);
         self.pieces.set(piece.id, PieceState::Decoding { bytes: size });
+        if piece.id.part == Part::Page {
+            self.shared.counters.page_bytes.add(piece.len);
+        }
         let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
+        let payloads = self.config.payloads;
         let work = move || {
-            let (result, nanos) = decode::decode(&piece, &boot, &bytes);
+            let (result, nanos) = decode::decode(&piece, &boot, &bytes, payloads);
             shared.counters.decode_nanos.add(nanos);
             let _ = sender.send(Message::Decoded { piece: piece.id, result });
         };
@@ -302,8 +326,8 @@ impl Loader {
             Ok(decoded) => {
                 self.shared.counters.decoded_nodes.add(1);
                 match (decoded, id.part) {
-                    (Decoded::Group(decoded), Part::Group(group)) => {
-                        Event::Group { node: id.node, group, decoded }
+                    (Decoded::Group(content), Part::Group(group)) => {
+                        Event::Group { node: id.node, group, content }
                     }
                     (Decoded::Page(page), _) => {
                         Event::Page { cloud: id.node.cloud, parent: id.node.key, page }
