@@ -5,6 +5,8 @@ pub mod commands;
 pub mod doctor;
 pub mod engine;
 pub mod eval;
+mod full_resolution;
+mod interrupt;
 pub mod load;
 pub mod metrics;
 pub mod path;

@@ -53,6 +53,7 @@ impl House {
                 drop_attributes: Vec::new(),
                 columns: None,
                 scale: None,
+                cells_per_spacing: lodestream_preprocess::CELLS_PER_SPACING,
                 cancel: Default::default(),
             };
             build(&config, &Quiet).expect("built");

@@ -3,10 +3,26 @@
 
 use libfuzzer_sys::fuzz_target;
 use lodestream_fuzz::ColumnsInput;
-use lodestream_protocol::{Domain, decode_unchecked, encode_column};
+use lodestream_protocol::{
+    Domain, Fine, GroupInfo, Manifest, Node, decode_unchecked, encode_column,
+};
+
+/// The same bytes, as where the points lie in their cells.
+fn fine_positions(manifest: &Manifest, node: &Node, payload: &[u8]) {
+    let mut manifest = manifest.clone();
+    let group = manifest.groups.len();
+    manifest.groups.push(GroupInfo { name: "fine".into(), columns: vec![0] });
+    manifest.fine = Some(Fine { group, cells_per_spacing: 2 });
+    let Ok(decoded) = decode_unchecked(&manifest, group, node, payload) else { return };
+    let Some(fine) = decoded.fine else { return };
+    assert_eq!(fine.offsets.len(), node.points as usize);
+    let inside = |q: &[u32; 3]| q.iter().all(|&v| u64::from(v) >> fine.cell_bits == 0);
+    assert!(fine.offsets.iter().all(inside), "a position outside its cell");
+}
 
 fuzz_target!(|data: &[u8]| {
     let Some(ColumnsInput { manifest, node, payload }) = ColumnsInput::parse(data) else { return };
+    fine_positions(&manifest, &node, payload);
     let Ok(decoded) = decode_unchecked(&manifest, 0, &node, payload) else { return };
     let count = node.points as usize;
     assert_eq!(decoded.positions.len(), count);

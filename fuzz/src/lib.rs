@@ -36,6 +36,7 @@ pub fn manifest(side_bits: u8, levels: u8, groups: usize, attributes: Vec<Attrib
             })
             .collect(),
         attributes,
+        fine: None,
         crs: None,
         sources: Vec::new(),
     }

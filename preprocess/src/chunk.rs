@@ -151,16 +151,13 @@ fn build_with<C: MortonCode>(
     for depth in 1..tree.levels.len() {
         for (index, node) in tree.levels[depth].iter().enumerate() {
             let own: Vec<u32> = sampled.points_of(&tree, depth, index).collect();
-            let mut out = encode_node(
-                context,
-                &mut encoder,
-                node,
-                bounds[depth][index],
-                part,
-                &codes,
-                &own,
-                |p| points.row(order[p as usize], row_bytes),
-            )?;
+            let tight = bounds[depth][index];
+            let below = u64::from(node.end - node.start);
+            let detail = Detail::of(context, node.key.level(), node.is_leaf(), tight, below);
+            let mut out =
+                encode_node(context, &mut encoder, node, tight, detail, part, &codes, &own, |p| {
+                    points.row(order[p as usize], row_bytes)
+                })?;
             out.normal_cone = normals.as_ref().map(|normals| normals[depth][index].cone);
             nodes.push(out);
         }
@@ -197,6 +194,7 @@ pub fn encode_node<'r, C: MortonCode>(
     encoder: &mut NodeEncoder,
     node: &TreeNode,
     bounds: LatticeBox,
+    detail: Detail,
     part: u32,
     codes: &[C],
     own: &[u32],
@@ -206,22 +204,17 @@ pub fn encode_node<'r, C: MortonCode>(
     let bits = context.manifest.lattice.node_bits(level);
     let starts = encoder.buffers.iter().map(|b| b.len() as u64).collect();
     let relative: Vec<C> = own.iter().map(|&p| codes[p as usize].within(bits)).collect();
+    let cell_bits = context.manifest.cell_bits(level, detail.spacing);
     let payloads = encoder
-        .encode(&relative, bits, |i| row(own[i]))
+        .encode(&relative, bits, cell_bits, |i| row(own[i]))
         .map_err(|e| Error::Setup(format!("node {}: {e}; too many points coincide", node.key)))?;
-    let guaranteed = context.manifest.spacing_world(level);
-    let (geometric_error, spacing) = if node.is_leaf() {
-        (0.0, leaf_spacing(context, bounds, u64::from(node.end - node.start)).min(guaranteed))
-    } else {
-        (guaranteed, guaranteed)
-    };
     Ok(OutNode {
         key: node.key,
         child_mask: node.child_mask,
         points: own.len() as u32,
         bounds,
-        geometric_error: geometric_error as f32,
-        spacing: spacing as f32,
+        geometric_error: detail.geometric_error,
+        spacing: detail.spacing,
         normal_cone: None,
         payloads,
         part,
@@ -229,8 +222,36 @@ pub fn encode_node<'r, C: MortonCode>(
     })
 }
 
+/// How fine a node is, world units.
+#[derive(Debug, Clone, Copy)]
+pub struct Detail {
+    /// How far the picture is off where the tree is cut here.
+    pub geometric_error: f32,
+    /// Between neighbouring points.
+    pub spacing: f32,
+}
+
+impl Detail {
+    /// Of a node of `points` points, those below it among them, in these bounds.
+    pub fn of(
+        context: &Context,
+        level: u8,
+        is_leaf: bool,
+        bounds: LatticeBox,
+        points: u64,
+    ) -> Self {
+        let guaranteed = context.manifest.spacing_world(level);
+        if is_leaf {
+            let mean = leaf_spacing(context, bounds, points);
+            Self { geometric_error: 0.0, spacing: mean.min(guaranteed) as f32 }
+        } else {
+            Self { geometric_error: guaranteed as f32, spacing: guaranteed as f32 }
+        }
+    }
+}
+
 /// Mean distance of neighbours were the points spread over the largest face of their bounds.
-pub fn leaf_spacing(context: &Context, bounds: LatticeBox, points: u64) -> f64 {
+fn leaf_spacing(context: &Context, bounds: LatticeBox, points: u64) -> f64 {
     if points == 0 {
         return 0.0;
     }

@@ -2,7 +2,7 @@
 
 use lodestream_protocol::{
     Attribute, Domain, Error as FormatError, GroupInfo, LatticeBox, Manifest, MortonCode, NodeKey,
-    NormalCone, ScalarType, encode_column, encode_positions,
+    NormalCone, ScalarType, encode_cells, encode_column, encode_fine_positions, encode_positions,
 };
 
 use crate::{cones::NormalColumn, readers::InputAttribute, schema::Schema};
@@ -16,6 +16,8 @@ pub struct Layout {
     pub offsets: Vec<usize>,
     /// The manifest's groups; bytes are filled in at the end.
     pub groups: Vec<GroupInfo>,
+    /// The group of fine positions, where positions are stored in two parts.
+    pub fine: Option<usize>,
     /// Bytes of a cut row: what varies.
     pub row_bytes: usize,
     /// Where the normals are in a cut row, if there are any and they vary.
@@ -53,12 +55,16 @@ fn group_name(attribute: &InputAttribute) -> &'static str {
 
 impl Layout {
     /// Lays out columns for the attributes of `schema`; those of which every value equals that in
-    /// `first_row` (`constant[i]`) are not stored, and rows are cut to the others.
-    pub fn new(schema: &Schema, constant: &[bool], first_row: &[u8]) -> Self {
+    /// `first_row` (`constant[i]`) are not stored, and rows are cut to the others. `has_fine` where
+    /// positions are stored in two parts.
+    pub fn new(schema: &Schema, constant: &[bool], first_row: &[u8], has_fine: bool) -> Self {
         let mut row_bytes = 0;
         let mut offsets = Vec::new();
         let mut kept = Vec::new();
-        let mut groups = vec![GroupInfo { name: "base".into(), columns: vec![0] }];
+        let group = |name: &str| GroupInfo { name: name.into(), columns: vec![0] };
+        let mut groups = vec![group("base")];
+        let fine = has_fine.then_some(groups.len());
+        groups.extend(fine.map(|_| group("fine")));
         let mut attributes = Vec::new();
         for ((input, &offset), &constant) in
             schema.attributes.iter().zip(&schema.offsets).zip(constant)
@@ -94,7 +100,28 @@ impl Layout {
             attributes.iter().zip(&offsets).find(|(a, _)| a.is_normal() && a.group().is_some());
         let normal = normal.map(|(a, &offset)| NormalColumn { offset, scalar: a.scalar });
         let store_row_bytes = schema.row_bytes;
-        Self { attributes, offsets, groups, row_bytes, normal, kept, store_row_bytes }
+        Self { attributes, offsets, groups, fine, row_bytes, normal, kept, store_row_bytes }
+    }
+
+    /// The columns of a dataset, positions in one part; rows hold what is stored.
+    pub fn of(manifest: &Manifest) -> Self {
+        let mut row_bytes = 0;
+        let offsets = manifest.attributes.iter().map(|attribute| {
+            let offset = row_bytes;
+            row_bytes += attribute.group().map_or(0, |_| attribute.value_bytes());
+            offset
+        });
+        let offsets = offsets.collect();
+        Self {
+            attributes: manifest.attributes.clone(),
+            offsets,
+            groups: manifest.groups.clone(),
+            fine: None,
+            row_bytes,
+            normal: None,
+            kept: Vec::new(),
+            store_row_bytes: row_bytes,
+        }
     }
 
     /// Rows of the store cut to what varies.
@@ -125,8 +152,10 @@ impl Layout {
 pub struct Ranges {
     /// Per attribute, per component.
     pub components: Vec<Vec<(f64, f64)>>,
-    /// Encoded bytes per attribute (first: positions).
+    /// Encoded bytes per attribute (first: positions, or the cells they lie in).
     pub column_bytes: Vec<u64>,
+    /// Encoded bytes of fine positions.
+    pub fine_bytes: u64,
 }
 
 impl Ranges {
@@ -135,7 +164,8 @@ impl Ranges {
         let none = (f64::INFINITY, f64::NEG_INFINITY);
         let components =
             layout.attributes.iter().map(|a| vec![none; usize::from(a.components)]).collect();
-        Self { components, column_bytes: vec![0; layout.attributes.len() + 1] }
+        let column_bytes = vec![0; layout.attributes.len() + 1];
+        Self { components, column_bytes, fine_bytes: 0 }
     }
 
     /// Takes in another part's ranges.
@@ -147,6 +177,7 @@ impl Ranges {
         for (a, b) in self.column_bytes.iter_mut().zip(&other.column_bytes) {
             *a += b;
         }
+        self.fine_bytes += other.fine_bytes;
     }
 
     /// Tells the manifest the ranges and the bytes of its columns.
@@ -156,6 +187,8 @@ impl Ranges {
         }
         let columns = manifest.attributes.iter().map(Attribute::group);
         let columns = std::iter::once(Some(0)).chain(columns).zip(&self.column_bytes);
+        let fine = manifest.fine.map(|fine| (Some(fine.group), &self.fine_bytes));
+        let columns = columns.chain(fine);
         for (index, group) in manifest.groups.iter_mut().enumerate() {
             let own = columns.clone().filter(|(group, _)| *group == Some(index));
             group.columns = own.map(|(_, &bytes)| bytes).collect();
@@ -247,8 +280,8 @@ impl<'a> NodeEncoder<'a> {
         }
     }
 
-    /// Encodes one node: `codes` are ascending and relative to the node, whose side is `bits` bits;
-    /// `row(i)` is the attribute row of point `i`.
+    /// Encodes one node: `codes` are ascending and relative to the node, whose side is `bits` bits and
+    /// that of its cells `cell_bits`; `row(i)` is the attribute row of point `i`.
     ///
     /// # Errors
     /// [`FormatError`] where the node has too many points.
@@ -256,13 +289,21 @@ impl<'a> NodeEncoder<'a> {
         &mut self,
         codes: &[C],
         bits: u8,
+        cell_bits: u8,
         row: impl Fn(usize) -> &'r [u8],
     ) -> Result<Vec<Payload>, FormatError> {
         if codes.is_empty() {
             return Ok(vec![Payload::default(); self.buffers.len()]);
         }
         let starts: Vec<usize> = self.buffers.iter().map(Vec::len).collect();
-        encode_positions(&mut self.buffers[0], codes, bits)?;
+        match self.layout.fine {
+            Some(fine) if cell_bits > 0 => {
+                encode_cells(&mut self.buffers[0], codes, bits, cell_bits)?;
+                encode_fine_positions(&mut self.buffers[fine], codes, cell_bits)?;
+                self.ranges.fine_bytes += (self.buffers[fine].len() - starts[fine]) as u64;
+            }
+            _ => encode_positions(&mut self.buffers[0], codes, bits)?,
+        }
         self.ranges.column_bytes[0] += (self.buffers[0].len() - starts[0]) as u64;
         self.rows.clear();
         self.rows.reserve(codes.len() * self.layout.row_bytes);

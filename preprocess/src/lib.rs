@@ -21,6 +21,7 @@ pub mod numerics;
 mod plan;
 mod positioned;
 pub mod readers;
+mod repack;
 mod schedule;
 mod schema;
 pub mod sim;
@@ -32,8 +33,10 @@ mod verify;
 pub mod writers;
 
 pub use build::{
-    BuildConfig, BuildReport, ColumnBytes, Dropped, Method, PhaseSeconds, Progress, build,
+    BuildConfig, BuildReport, CELLS_PER_SPACING, ColumnBytes, Dropped, Method, PhaseSeconds,
+    Progress, build,
 };
 pub use error::{Error, Result};
 pub use file::FileSource;
+pub use repack::with_whole_positions;
 pub use verify::{Comparison, MAX_FINDINGS, VerifyConfig, VerifyReport, verify};

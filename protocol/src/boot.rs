@@ -13,7 +13,7 @@ use crate::{
 /// The first eight bytes of every dataset. As in PNG, the line ends catch text-mode transfers.
 pub const MAGIC: [u8; 8] = *b"LODS\r\n\x1a\n";
 /// Readers refuse a larger major version.
-pub const VERSION_MAJOR: u16 = 1;
+pub const VERSION_MAJOR: u16 = 2;
 /// Readers of the same major version can read any minor version.
 pub const VERSION_MINOR: u16 = 0;
 /// Size of the fixed header in bytes.

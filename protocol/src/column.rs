@@ -17,7 +17,7 @@ use crate::{
     error::{Error, Result, corrupt},
     hierarchy::{MAX_NODE_POINTS, Node},
     manifest::Manifest,
-    morton::MortonCode,
+    position::{FinePositions, decode_fine_positions, decode_positions},
 };
 
 /// How a column's data is to be read; the byte in front of it.
@@ -38,6 +38,12 @@ pub enum Encoding {
     /// Two pco streams of u64: bits 48.. and bits 0..48 of the node-relative Morton codes, for
     /// nodes of more than 21 bits.
     MortonWide = 5,
+    /// A byte `s`, and one pco stream of u64: node-relative Morton codes without their lowest `3s`
+    /// bits, ascending. A position is the centre of its cell of side `2^s`.
+    Cells = 6,
+    /// A byte `s`, and the lowest `3s` bits of the Morton codes: one pco stream of u16 (`s` up to 5),
+    /// u32 (up to 10) or u64 (up to 21), else two as in [`MortonWide`](Self::MortonWide).
+    FinePositions = 7,
 }
 
 impl Encoding {
@@ -49,15 +55,15 @@ impl Encoding {
             3 => Self::PcoColor,
             4 => Self::Morton,
             5 => Self::MortonWide,
+            6 => Self::Cells,
+            7 => Self::FinePositions,
             other => return Err(corrupt("column", format!("unknown encoding {other}"))),
         })
     }
 }
 
-/// Low bits of a Morton code that [`Encoding::MortonWide`] keeps in its second stream.
-const WIDE_LOW_BITS: u32 = 48;
 /// Below this many values a raw column is tried too: pco's own tables can outweigh it.
-const TRY_RAW_BELOW: usize = 256;
+pub(crate) const TRY_RAW_BELOW: usize = 256;
 /// pco effort. On Autzen levels 4, 6 and 8 give 5.59, 5.40 and 5.37 bytes a point; 6 makes the build
 /// about 6 % longer than 4 does, 8 about 10 %.
 const PCO_LEVEL: usize = 6;
@@ -75,13 +81,17 @@ pub struct Column {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DecodedGroup {
     /// For group 0: positions in lattice units relative to the node's lowest corner, in Morton
-    /// order; empty for other groups.
+    /// order, or the centres of the cells that they lie in; empty for other groups.
     pub positions: Vec<[u32; 3]>,
+    /// log2 of the side of these cells in lattice units; 0 where the positions are whole.
+    pub cell_bits: u8,
+    /// For the group of [`Fine`](crate::Fine) positions, where the node has any.
+    pub fine: Option<FinePositions>,
     /// One per attribute of the group, in the manifest's order.
     pub columns: Vec<Column>,
 }
 
-fn config(scalar: ScalarType, delta: DeltaSpec) -> ChunkConfig {
+pub(crate) fn config(scalar: ScalarType, delta: DeltaSpec) -> ChunkConfig {
     let mode = match scalar {
         ScalarType::F32 | ScalarType::F64 => ModeSpec::Auto,
         _ => ModeSpec::Classic,
@@ -93,7 +103,7 @@ fn config(scalar: ScalarType, delta: DeltaSpec) -> ChunkConfig {
         .with_enable_8_bit(true)
 }
 
-fn push_column(out: &mut Vec<u8>, encoding: Encoding, data: &[u8]) -> Result<()> {
+pub(crate) fn push_column(out: &mut Vec<u8>, encoding: Encoding, data: &[u8]) -> Result<()> {
     let len = u32::try_from(data.len())
         .map_err(|_| corrupt("column", "more than 4 GiB of one node's values"))?;
     out.push(encoding as u8);
@@ -102,43 +112,17 @@ fn push_column(out: &mut Vec<u8>, encoding: Encoding, data: &[u8]) -> Result<()>
     Ok(())
 }
 
-fn push_stream<T: Number>(data: &mut Vec<u8>, values: &[T], config: &ChunkConfig) -> Result<()> {
+pub(crate) fn push_stream<T: Number>(
+    data: &mut Vec<u8>,
+    values: &[T],
+    config: &ChunkConfig,
+) -> Result<()> {
     let stream = simple_compress(values, config).map_err(|e| corrupt("column", e.to_string()))?;
     let len = u32::try_from(stream.len())
         .map_err(|_| corrupt("column", "more than 4 GiB of one node's values"))?;
     data.extend_from_slice(&len.to_le_bytes());
     data.extend_from_slice(&stream);
     Ok(())
-}
-
-/// Appends the position column of a node: `codes` are node-relative Morton codes, ascending, of a
-/// node with `bits` bits an axis.
-///
-/// # Errors
-/// [`Error::Corrupt`] where there are more than [`MAX_NODE_POINTS`] points.
-pub fn encode_positions<C: MortonCode>(out: &mut Vec<u8>, codes: &[C], bits: u8) -> Result<()> {
-    if codes.len() > MAX_NODE_POINTS as usize {
-        return Err(corrupt("node", format!("{} points in one node", codes.len())));
-    }
-    let mut data = Vec::new();
-    let delta = DeltaSpec::TryConsecutive(1);
-    let narrow = bits <= <u64 as MortonCode>::AXIS_BITS;
-    if narrow {
-        let codes: Vec<u64> = codes.iter().map(|c| c.low_u64(0)).collect();
-        push_stream(&mut data, &codes, &config(ScalarType::U64, delta))?;
-    } else {
-        let high: Vec<u64> = codes.iter().map(|c| c.low_u64(WIDE_LOW_BITS as u8)).collect();
-        let low: Vec<u64> =
-            codes.iter().map(|c| c.low_u64(0) & ((1 << WIDE_LOW_BITS) - 1)).collect();
-        push_stream(&mut data, &high, &config(ScalarType::U64, delta))?;
-        push_stream(&mut data, &low, &config(ScalarType::U64, DeltaSpec::NoOp))?;
-    }
-    if codes.len() < TRY_RAW_BELOW && data.len() >= 12 * codes.len() {
-        let raw: Vec<u8> =
-            codes.iter().flat_map(|c| c.decode()).flat_map(u32::to_le_bytes).collect();
-        return push_column(out, Encoding::Raw, &raw);
-    }
-    push_column(out, if narrow { Encoding::Morton } else { Encoding::MortonWide }, &data)
 }
 
 /// Calls `$body` with `$t` bound to the Rust type of `$scalar`.
@@ -256,7 +240,7 @@ fn color<T: Scalar>(data: &mut Vec<u8>, values: &[u8], sub: fn(T, T) -> T) -> Re
 }
 
 /// Splits `bytes` at `len`, or says what is missing.
-fn take<'a>(bytes: &mut &'a [u8], len: usize) -> Result<&'a [u8]> {
+pub(crate) fn take<'a>(bytes: &mut &'a [u8], len: usize) -> Result<&'a [u8]> {
     let (head, tail) = bytes.split_at_checked(len).ok_or(Error::Truncated {
         what: "column",
         needed: len as u64,
@@ -266,18 +250,18 @@ fn take<'a>(bytes: &mut &'a [u8], len: usize) -> Result<&'a [u8]> {
     Ok(head)
 }
 
-fn take_u32(bytes: &mut &[u8]) -> Result<usize> {
+pub(crate) fn take_u32(bytes: &mut &[u8]) -> Result<usize> {
     let raw = take(bytes, 4)?;
     Ok(u32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]]) as usize)
 }
 
-fn take_column<'a>(bytes: &mut &'a [u8]) -> Result<(Encoding, &'a [u8])> {
+pub(crate) fn take_column<'a>(bytes: &mut &'a [u8]) -> Result<(Encoding, &'a [u8])> {
     let encoding = Encoding::parse(take(bytes, 1)?[0])?;
     let len = take_u32(bytes)?;
     Ok((encoding, take(bytes, len)?))
 }
 
-fn take_stream<T: Number + Default>(data: &mut &[u8], count: usize) -> Result<Vec<T>> {
+pub(crate) fn take_stream<T: Number + Default>(data: &mut &[u8], count: usize) -> Result<Vec<T>> {
     let len = take_u32(data)?;
     let stream = take(data, len)?;
     let mut values = vec![T::default(); count];
@@ -289,36 +273,8 @@ fn take_stream<T: Number + Default>(data: &mut &[u8], count: usize) -> Result<Ve
     Ok(values)
 }
 
-fn check_used(data: &[u8]) -> Result<()> {
+pub(crate) fn check_used(data: &[u8]) -> Result<()> {
     if data.is_empty() { Ok(()) } else { Err(corrupt("column", "bytes are left over")) }
-}
-
-fn decode_positions(bytes: &mut &[u8], count: usize, bits: u8) -> Result<Vec<[u32; 3]>> {
-    let (encoding, mut data) = take_column(bytes)?;
-    let positions = match encoding {
-        Encoding::Raw => take(&mut data, count * 12)?
-            .chunks_exact(12)
-            .map(|v| bytemuck::pod_read_unaligned::<[u32; 3]>(v).map(u32::from_le))
-            .collect(),
-        Encoding::Morton if bits <= <u64 as MortonCode>::AXIS_BITS => {
-            take_stream::<u64>(&mut data, count)?.into_iter().map(MortonCode::decode).collect()
-        }
-        Encoding::MortonWide => {
-            let high = take_stream::<u64>(&mut data, count)?;
-            let low = take_stream::<u64>(&mut data, count)?;
-            high.iter()
-                .zip(low)
-                .map(|(&h, l)| (u128::from(h) << WIDE_LOW_BITS | u128::from(l)).decode())
-                .collect()
-        }
-        other => return Err(corrupt("column", format!("{other:?} positions in {bits} bits"))),
-    };
-    check_used(data)?;
-    let positions: Vec<[u32; 3]> = positions;
-    if positions.iter().flatten().any(|&q| u64::from(q) >> bits != 0) {
-        return Err(corrupt("column", "a position is outside its node"));
-    }
-    Ok(positions)
 }
 
 fn decode_column(bytes: &mut &[u8], attribute: &Attribute, count: usize) -> Result<Vec<u8>> {
@@ -432,9 +388,15 @@ pub fn decode_unchecked(
         check_used(payload)?;
         return Ok(decoded);
     }
+    let bits = manifest.lattice.node_bits(node.key.level());
     if group == 0 {
-        let bits = manifest.lattice.node_bits(node.key.level());
-        decoded.positions = decode_positions(&mut payload, count, bits)?;
+        (decoded.positions, decoded.cell_bits) = decode_positions(&mut payload, count, bits)?;
+    } else if manifest.fine.is_some_and(|fine| fine.group == group) {
+        if payload.is_empty() {
+            // The cells are the positions.
+            return Ok(decoded);
+        }
+        decoded.fine = Some(decode_fine_positions(&mut payload, count, bits)?);
     }
     let mut texels = 0;
     for (index, attribute) in manifest.attributes.iter().enumerate() {
@@ -502,31 +464,12 @@ mod tests {
         }
 
         #[test]
-        fn positions_of_any_width_read_back(
-            bits in 0u8..=32, mut points in prop::collection::vec(any::<[u32; 3]>(), 1..600),
-        ) {
-            let mask = ((1u64 << bits) - 1) as u32;
-            points.iter_mut().flatten().for_each(|c| *c &= mask);
-            points.sort_by_key(|&q| u128::encode(q));
-            let mut column = Vec::new();
-            if bits <= 21 {
-                let codes: Vec<u64> = points.iter().map(|&q| u64::encode(q)).collect();
-                encode_positions(&mut column, &codes, bits)?;
-            } else {
-                let codes: Vec<u128> = points.iter().map(|&q| u128::encode(q)).collect();
-                encode_positions(&mut column, &codes, bits)?;
-            }
-            prop_assert_eq!(decode_positions(&mut &column[..], points.len(), bits)?, points);
-        }
-
-        #[test]
         fn garbage_never_panics(bytes in prop::collection::vec(any::<u8>(), 0..300), count in 0usize..1000) {
             let attribute = Attribute {
                 name: "a".into(), scalar: ScalarType::U16, components: 3, domain: Domain::Element,
                 storage: Storage::Column { group: 0 }, min: vec![], max: vec![],
             };
             let _ = decode_column(&mut &bytes[..], &attribute, count);
-            let _ = decode_positions(&mut &bytes[..], count, 13);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     boot::{BOOT_SPECULATIVE_BYTES, Boot, Header},
-    column::{Column, decode_group},
+    column::{Column, DecodedGroup, decode_group},
     error::{Error, Result, corrupt},
     hierarchy::Node,
     key::NodeKey,
@@ -29,8 +29,11 @@ pub trait ReadAt {
 pub struct NodePoints {
     /// The node.
     pub key: NodeKey,
-    /// Lattice units relative to the node's lowest corner, in Morton order.
+    /// Lattice units relative to the node's lowest corner, in Morton order. Where the manifest has
+    /// [`Fine`](crate::Fine) positions and these were not read: the centres of their cells.
     pub positions: Vec<[u32; 3]>,
+    /// log2 of the side of these cells in lattice units; 0 where the positions are whole.
+    pub cell_bits: u8,
     /// Columns of the groups that were read, in the manifest's order.
     pub columns: Vec<Column>,
 }
@@ -40,6 +43,29 @@ impl NodePoints {
     #[must_use]
     pub fn column(&self, index: usize) -> Option<&Column> {
         self.columns.iter().find(|c| c.attribute == index)
+    }
+
+    /// A node of which nothing was read yet.
+    #[must_use]
+    pub const fn new(key: NodeKey) -> Self {
+        Self { key, positions: Vec::new(), cell_bits: 0, columns: Vec::new() }
+    }
+
+    /// Takes in a group; group 0 comes before fine positions.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`] where there are fine positions, but not of these points.
+    pub fn add(&mut self, group: DecodedGroup) -> Result<()> {
+        if !group.positions.is_empty() {
+            (self.positions, self.cell_bits) = (group.positions, group.cell_bits);
+        }
+        if let Some(fine) = group.fine {
+            fine.refine(&mut self.positions)?;
+            self.cell_bits = 0;
+        }
+        self.columns.extend(group.columns);
+        self.columns.sort_by_key(|column| column.attribute);
+        Ok(())
     }
 }
 
@@ -114,24 +140,20 @@ impl<R: ReadAt> Dataset<R> {
         Ok(nodes)
     }
 
-    /// Reads and decodes a node: group 0 always, and the given further groups.
+    /// Reads and decodes a node to the last bit: positions always, and the given further groups.
     ///
     /// # Errors
     /// What the source says, or what is wrong with the bytes.
     pub fn read_node(&self, node: &Node, groups: &[usize]) -> Result<NodePoints> {
-        let mut points = NodePoints { key: node.key, positions: Vec::new(), columns: Vec::new() };
-        let further = groups.iter().copied().filter(|&g| g != 0);
-        for group in std::iter::once(0).chain(further) {
+        let mut points = NodePoints::new(node.key);
+        let fine = self.manifest().fine.map(|fine| fine.group);
+        let further = groups.iter().copied().filter(|&g| g != 0 && Some(g) != fine);
+        for group in std::iter::once(0).chain(fine).chain(further) {
             let payload =
                 node.payloads.get(group).ok_or_else(|| corrupt("node", "no such group"))?;
             let bytes = self.source.read_at(payload.offset, payload.bytes as usize)?;
-            let mut decoded = decode_group(self.manifest(), group, node, &bytes)?;
-            if group == 0 {
-                points.positions = decoded.positions;
-            }
-            points.columns.append(&mut decoded.columns);
+            points.add(decode_group(self.manifest(), group, node, &bytes)?)?;
         }
-        points.columns.sort_by_key(|c| c.attribute);
         Ok(points)
     }
 }

@@ -18,6 +18,9 @@ use crate::{
 /// Most elements in one node: what a reader must be ready to allocate for.
 pub const MAX_NODE_POINTS: u32 = 1 << 24;
 
+/// log2 of the slices that a node's side is cut into to tell its bounds.
+pub(crate) const BOUNDS_BITS: u8 = 8;
+
 /// Where a node's payload of one group is, and its CRC-32.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PayloadRef {

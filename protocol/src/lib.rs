@@ -9,6 +9,7 @@
 //! columns). [`Dataset`] walks that way synchronously over any [`ReadAt`].
 
 mod attribute;
+mod batch;
 mod boot;
 mod column;
 mod dataset;
@@ -19,22 +20,28 @@ mod lattice;
 mod manifest;
 mod morton;
 mod normal_cone;
+mod position;
 mod wire;
 
 pub use attribute::{Attribute, Domain, ScalarType, Storage};
+pub use batch::{
+    BATCH_HEAD_BYTES, BATCH_REQUEST_TYPE, BATCH_TYPE, BatchDecoder, BatchPart, BatchRequest,
+    BatchStep, FRAME_HEAD_BYTES, MAX_BATCH_BYTES, MAX_BATCH_PARTS, MAX_BATCH_REQUEST_BYTES,
+    batch_head, frame_head,
+};
 pub use boot::{
     BOOT_SPECULATIVE_BYTES, Boot, HEADER_BYTES, Header, MAGIC, VERSION_MAJOR, VERSION_MINOR,
 };
 pub use column::{
     Column, DecodedGroup, Encoding, check_group, decode_group, decode_unchecked, encode_column,
-    encode_positions,
 };
 pub use dataset::{Dataset, NodePoints, ReadAt};
 pub use error::{Error, Result};
 pub use hierarchy::{HierarchyPage, MAX_NODE_POINTS, Node, PageRef, PayloadRef};
 pub use key::NodeKey;
 pub use lattice::{Lattice, LatticeBox, MAX_SIDE_BITS};
-pub use manifest::{GroupInfo, Manifest, Method, Primitive, Refinement, SourceInfo};
+pub use manifest::{Fine, GroupInfo, Manifest, Method, Primitive, Refinement, SourceInfo};
 pub use morton::{MortonCode, morton_decode, morton_encode};
 pub use normal_cone::NormalCone;
+pub use position::{FinePositions, encode_cells, encode_fine_positions, encode_positions};
 pub use wire::MAX_PAGE_BYTES;

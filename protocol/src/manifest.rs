@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::{
     attribute::{Attribute, Domain},
     error::{Result, corrupt},
+    hierarchy::BOUNDS_BITS,
     lattice::{Lattice, LatticeBox},
+    position::MAX_CELL_AXIS_BITS,
 };
 
 /// How a child relates to its parent.
@@ -77,6 +79,16 @@ impl GroupInfo {
     }
 }
 
+/// Positions in two parts: cells in group 0, the rest in a group of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fine {
+    /// The group that says where in their cells the points lie. It has no other columns.
+    pub group: usize,
+    /// The side of a node's cells is the largest power of two of lattice units that is at most its
+    /// spacing over this.
+    pub cells_per_spacing: u32,
+}
+
 /// One input the dataset was made from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceInfo {
@@ -113,6 +125,9 @@ pub struct Manifest {
     pub attributes: Vec<Attribute>,
     /// Column groups; group 0 always exists and starts with the position column.
     pub groups: Vec<GroupInfo>,
+    /// Where positions are stored in two parts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fine: Option<Fine>,
     /// Coordinate reference system as the source gives it (WKT), if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crs: Option<String>,
@@ -188,7 +203,11 @@ impl Manifest {
             }
         }
         for (index, group) in self.groups.iter().enumerate() {
-            let columns = usize::from(index == 0) + self.columns_of(index).count();
+            let is_fine = self.fine.is_some_and(|fine| fine.group == index);
+            let columns = usize::from(index == 0 || is_fine) + self.columns_of(index).count();
+            if is_fine && columns > 1 {
+                return bad(format!("group {} of fine positions has attributes", group.name));
+            }
             if group.columns.len() != columns {
                 return bad(format!(
                     "group {} tells the bytes of {} columns, it has {columns}",
@@ -196,6 +215,12 @@ impl Manifest {
                     group.columns.len()
                 ));
             }
+        }
+        if let Some(Fine { group, cells_per_spacing }) = self.fine
+            && (group == 0 || group >= self.groups.len() || cells_per_spacing == 0)
+        {
+            let why = format!("group {group}, {cells_per_spacing} cells a spacing");
+            return bad(format!("fine positions in {why}, which cannot be"));
         }
         for &(name, components) in self.primitive.required_attributes() {
             if self.attribute(name).is_none_or(|a| a.components != components) {
@@ -223,6 +248,22 @@ impl Manifest {
     #[must_use]
     pub fn spacing_world(&self, level: u8) -> f64 {
         self.lattice.node_side_world(level) / f64::from(self.method.grid.max(1))
+    }
+
+    /// log2 of the side, in lattice units, of the cells that group 0 tells the positions of a node to;
+    /// 0 where it tells them to the last bit.
+    #[must_use]
+    pub fn cell_bits(&self, level: u8, spacing_world: f32) -> u8 {
+        let Some(fine) = self.fine else { return 0 };
+        let bits = self.lattice.node_bits(level);
+        let side =
+            f64::from(spacing_world) / self.lattice.scale / f64::from(fine.cells_per_spacing);
+        // The exponent is the whole part of the logarithm.
+        let log2 = if side >= 1.0 { (side.to_bits() >> 52) as i64 - 1023 } else { 0 };
+        // No cell is larger than a slice of the node's bounds, so that these hold for cells' centres.
+        let most = bits.saturating_sub(BOUNDS_BITS);
+        let least = bits.saturating_sub(MAX_CELL_AXIS_BITS);
+        u8::try_from(log2).unwrap_or(u8::MAX).min(most).max(least)
     }
 
     /// Tight bounds in world units (lowest, highest corner); `None` where there are no points.
@@ -263,6 +304,7 @@ mod tests {
                 GroupInfo { name: "base".into(), columns: vec![7] },
                 GroupInfo { name: "more".into(), columns: vec![8] },
             ],
+            fine: None,
             crs: None,
             sources: vec![],
         }

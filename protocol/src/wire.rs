@@ -9,7 +9,10 @@ use bincode::{
     config::{Configuration, Limit, LittleEndian, Varint, standard},
 };
 
-use crate::error::{Result, corrupt};
+use crate::{
+    batch::MAX_BATCH_REQUEST_BYTES,
+    error::{Result, corrupt},
+};
 
 /// No page is larger than this, so a lying length cannot make a reader allocate more.
 pub const MAX_PAGE_BYTES: usize = 64 << 20;
@@ -66,5 +69,36 @@ impl WirePage {
             ));
         }
         Ok(page)
+    }
+}
+
+/// Enough for what the longest request takes once it is decoded.
+const MAX_DECODED_BATCH_BYTES: usize = 2 * MAX_BATCH_REQUEST_BYTES;
+
+/// A batch request as it is sent: the dataset's identity, then offset and length of every part.
+#[derive(Debug, Clone, PartialEq, Eq, Encode, Decode)]
+pub struct WireBatch {
+    pub content_id: [u8; 16],
+    pub parts: Vec<(u64, u32)>,
+}
+
+impl WireBatch {
+    /// The request's bytes.
+    pub fn encode(&self) -> Result<Vec<u8>> {
+        bincode::encode_to_vec(self, config()).map_err(|e| corrupt("batch request", e.to_string()))
+    }
+
+    /// Undoes [`encode`](Self::encode); every byte must be used.
+    pub fn decode(bytes: &[u8]) -> Result<Self> {
+        if bytes.len() > MAX_BATCH_REQUEST_BYTES {
+            return Err(corrupt("batch request", format!("{} bytes are too many", bytes.len())));
+        }
+        let config = standard().with_limit::<MAX_DECODED_BATCH_BYTES>();
+        let (batch, used) = bincode::decode_from_slice::<Self, _>(bytes, config)
+            .map_err(|e| corrupt("batch request", e.to_string()))?;
+        if used != bytes.len() {
+            return Err(corrupt("batch request", format!("{used} of {} bytes used", bytes.len())));
+        }
+        Ok(batch)
     }
 }

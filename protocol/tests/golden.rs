@@ -6,9 +6,10 @@
 use std::path::PathBuf;
 
 use lodestream_protocol::{
-    Attribute, Boot, Dataset, Domain, Error, GroupInfo, HierarchyPage, Lattice, LatticeBox,
-    Manifest, Method, Node, NodeKey, NormalCone, PageRef, PayloadRef, Primitive, Refinement,
-    ScalarType, SourceInfo, Storage, encode_column, encode_positions, morton_encode,
+    Attribute, Boot, Dataset, Domain, Error, Fine, GroupInfo, HierarchyPage, Lattice, LatticeBox,
+    Manifest, Method, Node, NodeKey, NodePoints, NormalCone, PageRef, PayloadRef, Primitive,
+    ReadAt, Refinement, ScalarType, SourceInfo, Storage, decode_group, encode_cells, encode_column,
+    encode_fine_positions, encode_positions, morton_encode,
 };
 
 fn attribute(name: &str, scalar: ScalarType, components: u8, group: usize) -> Attribute {
@@ -73,21 +74,43 @@ fn elements(primitive: Primitive) -> Vec<(Attribute, [Vec<u8>; 2])> {
 /// Around the third axis and a little wider than half a sphere: all normals above are in it.
 const CONE: NormalCone = NormalCone::from_bytes([128, 127, 128]);
 
+/// Whether positions are stored in two parts.
+#[derive(Clone, Copy, PartialEq)]
+enum Positions {
+    Whole,
+    Cells,
+}
+
 /// A root with two elements and, in a page of its own, one child with one element.
-fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
+fn dataset(primitive: Primitive, refinement: Refinement, stored: Positions) -> Vec<u8> {
     let elements = elements(primitive);
     let attributes: Vec<Attribute> = elements.iter().map(|(a, _)| a.clone()).collect();
-    let groups = 1 + attributes.iter().filter_map(Attribute::group).max().unwrap_or(0);
-    let lattice =
-        Lattice { scale: 0.01, offset: [1000.0, 2000.0, -5.0], origin: [7, -8, 9], side_bits: 4 };
+    let last = attributes.iter().filter_map(Attribute::group).max().unwrap_or(0);
+    // Cells need a root of more than 256 lattice units.
+    let (fine, finer) = match stored {
+        Positions::Whole => (None, 0),
+        Positions::Cells => (Some(Fine { group: last + 1, cells_per_spacing: 2 }), 8),
+    };
+    let groups = 1 + last + usize::from(fine.is_some());
+    let lattice = Lattice {
+        scale: 0.01,
+        offset: [1000.0, 2000.0, -5.0],
+        origin: [7, -8, 9],
+        side_bits: 4 + finer,
+    };
     let positions = [vec![[0, 1, 2], [15, 15, 15]], vec![[3, 0, 7]]];
+    let within = if fine.is_some() { 37 } else { 0 };
+    let positions =
+        positions.map(|node| node.into_iter().map(|q| q.map(|c| (c << finer) + within)).collect());
+    let positions: [Vec<[u32; 3]>; 2] = positions;
     let keys = [NodeKey::ROOT, NodeKey::ROOT.child(5).expect("octant")];
     let mut payloads: Vec<Vec<Vec<u8>>> = Vec::new();
     let mut infos: Vec<GroupInfo> = (0..groups)
         .map(|group| {
             let name = if group == 0 { "base".into() } else { format!("group{group}") };
             let own = attributes.iter().filter(|a| a.group() == Some(group)).count();
-            GroupInfo { name, columns: vec![0; usize::from(group == 0) + own] }
+            let has_positions = group == 0 || fine.is_some_and(|fine| fine.group == group);
+            GroupInfo { name, columns: vec![0; usize::from(has_positions) + own] }
         })
         .collect();
     for (n, positions) in positions.iter().enumerate() {
@@ -95,7 +118,15 @@ fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
         let mut columns = vec![0; groups];
         columns[0] = 1;
         let codes: Vec<u64> = positions.iter().map(|&q| morton_encode(q)).collect();
-        encode_positions(&mut node[0], &codes, lattice.node_bits(n as u8)).expect("encodes");
+        let bits = lattice.node_bits(n as u8);
+        match fine {
+            None => encode_positions(&mut node[0], &codes, bits).expect("encodes"),
+            Some(fine) => {
+                encode_cells(&mut node[0], &codes, bits, CELL_BITS).expect("encodes");
+                encode_fine_positions(&mut node[fine.group], &codes, CELL_BITS).expect("encodes");
+                infos[fine.group].columns[0] += node[fine.group].len() as u64;
+            }
+        }
         infos[0].columns[0] += node[0].len() as u64;
         for (attribute, values) in &elements {
             let group = attribute.group().expect("a column");
@@ -115,15 +146,20 @@ fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
         primitive,
         method: Method { name: "golden".into(), grid: 128, leaf_capacity: 2 },
         lattice,
-        bounds: LatticeBox { min: [0, 0, 2], max: [15, 15, 15] },
+        bounds: LatticeBox {
+            min: [0, 0, 2].map(|c| (c << finer) + within),
+            max: [(15 << finer) + within; 3],
+        },
         largest_rounding: 0.0,
         attributes,
         groups: infos,
+        fine,
         crs: None,
         sources: vec![SourceInfo { name: "golden.las".into(), points: 3 }],
     };
     // Offsets from the end of the index: group by group, root before child.
     let mut offset = 0;
+    assert!(fine.is_none() || manifest.cell_bits(0, 0.25) == CELL_BITS);
     let mut offsets = [Vec::new(), Vec::new()];
     for group in 0..groups {
         for (node, offsets) in offsets.iter_mut().enumerate() {
@@ -145,7 +181,8 @@ fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
             .collect(),
         child_page: None,
     };
-    let child = node(1, 0, LatticeBox { min: [11, 0, 15], max: [11, 0, 15] });
+    let only = [11, 0, 15].map(|c| (c << finer) + within);
+    let child = node(1, 0, LatticeBox { min: only, max: only });
     let child_page =
         HierarchyPage::encode(&[child], offsets[1].clone(), &lattice).expect("encodes");
     let mut root = node(0, 1 << 5, manifest.bounds);
@@ -166,6 +203,9 @@ fn dataset(primitive: Primitive, refinement: Refinement) -> Vec<u8> {
     file
 }
 
+/// Of spacings of 25 lattice units, two cells each.
+const CELL_BITS: u8 = 3;
+
 const KINDS: [(&str, Primitive, Refinement); 8] = [
     ("point-additive", Primitive::Point, Refinement::Additive),
     ("point-replace", Primitive::Point, Refinement::Replace),
@@ -180,8 +220,11 @@ const KINDS: [(&str, Primitive, Refinement); 8] = [
 #[test]
 fn every_primitive_and_refinement_keeps_its_bytes() {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
-    for (name, primitive, refinement) in KINDS {
-        let bytes = dataset(primitive, refinement);
+    let whole = KINDS.map(|(name, primitive, refinement)| {
+        (name, dataset(primitive, refinement, Positions::Whole))
+    });
+    let cells = dataset(Primitive::Point, Refinement::Additive, Positions::Cells);
+    for (name, bytes) in whole.into_iter().chain([("point-cells", cells)]) {
         let path = folder.join(format!("{name}.lods"));
         if std::env::var_os("LODESTREAM_WRITE_GOLDEN").is_some() {
             std::fs::create_dir_all(&folder).expect("folder");
@@ -195,7 +238,8 @@ fn every_primitive_and_refinement_keeps_its_bytes() {
 #[test]
 fn every_primitive_and_refinement_reads_back() {
     for (name, primitive, refinement) in KINDS {
-        let dataset = Dataset::open(dataset(primitive, refinement)).expect(name);
+        let dataset = dataset(primitive, refinement, Positions::Whole);
+        let dataset = Dataset::open(dataset).expect(name);
         assert_eq!(dataset.manifest().primitive, primitive);
         assert_eq!(dataset.manifest().refinement, refinement);
         let nodes = dataset.hierarchy().expect(name);
@@ -220,8 +264,40 @@ fn every_primitive_and_refinement_reads_back() {
 }
 
 #[test]
+fn files_of_the_first_version_are_read() {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden/version-1.lods");
+    let old = Dataset::open(std::fs::read(path).expect("committed")).expect("a dataset");
+    assert_eq!(old.boot().header.version, (1, 0));
+    let new = dataset(Primitive::Rectangle, Refinement::Replace, Positions::Whole);
+    let new = Dataset::open(new).expect("a dataset");
+    assert_eq!(old.manifest(), new.manifest());
+    for node in old.hierarchy().expect("a tree") {
+        let read = |dataset: &Dataset<Vec<u8>>| dataset.read_node(&node, &[0]).expect("read");
+        assert_eq!(read(&old), read(&new));
+    }
+}
+
+#[test]
+fn cells_are_drawn_in_their_middles_and_fine_positions_are_exact() {
+    let bytes = dataset(Primitive::Point, Refinement::Additive, Positions::Cells);
+    let dataset = Dataset::open(bytes).expect("a dataset");
+    let nodes = dataset.hierarchy().expect("a tree");
+    let exact = dataset.read_node(&nodes[0], &[]).expect("read");
+    assert_eq!(exact.positions, [[37, 256 + 37, 512 + 37], [15 * 256 + 37; 3]]);
+    let base = nodes[0].payloads[0];
+    let payload = dataset.source().read_at(base.offset, base.bytes as usize).expect("read");
+    let mut points = NodePoints::new(nodes[0].key);
+    points
+        .add(decode_group(dataset.manifest(), 0, &nodes[0], &payload).expect("decodes"))
+        .expect("fits");
+    // 37 lies in the cell from 32 to 39.
+    assert_eq!(points.positions, [[36, 256 + 36, 512 + 36], [15 * 256 + 36; 3]]);
+    assert_eq!((points.cell_bits, exact.cell_bits), (CELL_BITS, 0));
+}
+
+#[test]
 fn every_cut_is_refused() {
-    let whole = dataset(Primitive::Rectangle, Refinement::Replace);
+    let whole = dataset(Primitive::Rectangle, Refinement::Replace, Positions::Whole);
     for len in 0..whole.len() {
         let error = Dataset::open(whole[..len].to_vec()).expect_err("refused");
         assert!(matches!(error, Error::Truncated { .. }), "{len}: {error}");
@@ -230,7 +306,7 @@ fn every_cut_is_refused() {
 
 #[test]
 fn every_flipped_bit_is_found() {
-    let whole = dataset(Primitive::Disc, Refinement::Replace);
+    let whole = dataset(Primitive::Disc, Refinement::Replace, Positions::Whole);
     for bit in 0..8 * whole.len() {
         let mut bytes = whole.clone();
         bytes[bit / 8] ^= 1 << (bit % 8);

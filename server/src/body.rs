@@ -1,4 +1,4 @@
-//! The body of a response: a range of a file, read piece by piece as the client takes it.
+//! The body of a response: ranges of a file, read piece by piece as the client takes it.
 //!
 //! Pieces are read by position into recycled buffers. While the system has the bytes in its cache,
 //! that is done in place (`preadv2` with `RWF_NOWAIT`, which never waits for the disk); the rest
@@ -25,6 +25,7 @@
 //! answered 0.8 to 1.05 times as many hot, twice as many cold requests.
 
 use std::{
+    future::poll_fn,
     io,
     ops::Range,
     pin::Pin,
@@ -32,7 +33,7 @@ use std::{
     task::{Context, Poll, ready},
 };
 
-use bytes::Bytes;
+use bytes::{Buf, Bytes};
 use http_body::{Body, Frame, SizeHint};
 use tokio::task::JoinHandle;
 
@@ -41,74 +42,184 @@ use crate::{
     file::DatasetFile,
 };
 
-/// A range of a file.
-#[derive(Debug)]
-pub(crate) struct FileBody {
-    file: Arc<DatasetFile>,
-    /// What is still to be sent.
-    rest: Range<u64>,
-    pool: Arc<BufferPool>,
-    /// The piece being read on the blocking pool.
-    reading: Option<JoinHandle<io::Result<Buffer>>>,
+/// What a response is made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Segment {
+    /// Bytes of the server's own: the head of a part.
+    Text(Bytes),
+    /// A range of the file.
+    File(Range<u64>),
 }
 
-impl FileBody {
-    /// `range` lies within the file.
-    pub(crate) const fn new(
-        file: Arc<DatasetFile>,
-        range: Range<u64>,
-        pool: Arc<BufferPool>,
-    ) -> Self {
-        Self { file, rest: range, pool, reading: None }
-    }
-
-    fn read_piece(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<Buffer>> {
-        let mut reading = match self.reading.take() {
-            Some(reading) => reading,
-            None => {
-                let mut buffer = self.pool.take();
-                let left = usize::try_from(self.rest.end - self.rest.start).unwrap_or(usize::MAX);
-                let wanted = left.min(PIECE_BYTES);
-                let offset = self.rest.start;
-                buffer.filled = read_cached(&self.file, &mut buffer.bytes[..wanted], offset);
-                if buffer.filled == wanted {
-                    return Poll::Ready(Ok(buffer));
-                }
-                let file = Arc::clone(&self.file);
-                tokio::task::spawn_blocking(move || {
-                    read_rest(&file, &mut buffer, wanted, offset)?;
-                    Ok(buffer)
-                })
-            }
-        };
-        match Pin::new(&mut reading).poll(cx) {
-            Poll::Ready(outcome) => {
-                Poll::Ready(outcome.unwrap_or_else(|e| Err(io::Error::other(e))))
-            }
-            Poll::Pending => {
-                self.reading = Some(reading);
-                Poll::Pending
-            }
+impl Segment {
+    pub(crate) fn len(&self) -> u64 {
+        match self {
+            Self::Text(text) => text.len() as u64,
+            Self::File(range) => range.end - range.start,
         }
     }
 }
 
-/// Reads on until the buffer holds the `wanted` bytes from `offset` on, waiting for the disk.
-fn read_rest(
-    file: &DatasetFile,
-    buffer: &mut Buffer,
-    wanted: usize,
-    offset: u64,
-) -> io::Result<()> {
-    let have = buffer.filled;
-    let rest = &mut buffer.bytes[have..wanted];
-    buffer.filled += file.source.read_into(rest, offset + have as u64)?;
-    if buffer.filled < wanted {
-        let end = offset + buffer.filled as u64;
-        let message = format!("the file was cut short to {end} bytes");
-        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, message));
+/// Ranges of a file, with or without something in between.
+#[derive(Debug)]
+pub(crate) struct FileBody {
+    /// Bytes that are still to be sent.
+    left: u64,
+    pool: Arc<BufferPool>,
+    state: State,
+}
+
+#[derive(Debug)]
+enum State {
+    Ready(Rest),
+    /// A piece is being read on the blocking pool.
+    Reading(JoinHandle<(Rest, io::Result<Buffer>)>),
+    Ended,
+}
+
+/// What is still to be read.
+#[derive(Debug)]
+struct Rest {
+    file: Arc<DatasetFile>,
+    current: Segment,
+    others: std::vec::IntoIter<Segment>,
+}
+
+impl FileBody {
+    /// `range` lies within the file.
+    pub(crate) fn new(file: Arc<DatasetFile>, range: Range<u64>, pool: Arc<BufferPool>) -> Self {
+        Self::with_segments(file, Segment::File(range), Vec::new(), pool)
     }
-    Ok(())
+
+    /// `segments`, one after the other. Ranges lie within the file.
+    pub(crate) fn of(
+        file: Arc<DatasetFile>,
+        segments: Vec<Segment>,
+        pool: Arc<BufferPool>,
+    ) -> Self {
+        Self::with_segments(file, Segment::Text(Bytes::new()), segments, pool)
+    }
+
+    fn with_segments(
+        file: Arc<DatasetFile>,
+        current: Segment,
+        others: Vec<Segment>,
+        pool: Arc<BufferPool>,
+    ) -> Self {
+        let left = current.len() + others.iter().map(Segment::len).sum::<u64>();
+        let rest = Rest { file, current, others: others.into_iter() };
+        Self { left, pool, state: State::Ready(rest) }
+    }
+
+    /// Bytes that are still to be sent.
+    pub(crate) const fn left(&self) -> u64 {
+        self.left
+    }
+
+    /// Reads a piece: in place if the system has all of it, else on the blocking pool.
+    fn read_piece(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<Buffer>> {
+        loop {
+            match std::mem::replace(&mut self.state, State::Ended) {
+                State::Ready(mut rest) => {
+                    let mut buffer = self.pool.take();
+                    let wanted = usize::try_from(self.left).unwrap_or(usize::MAX).min(PIECE_BYTES);
+                    if rest.fill(&mut buffer, wanted, read_cached).is_ok() {
+                        let checked = rest.check();
+                        self.state = State::Ready(rest);
+                        return Poll::Ready(checked.map(|()| buffer));
+                    }
+                    self.state = State::Reading(tokio::task::spawn_blocking(move || {
+                        let read = rest.fill(&mut buffer, wanted, read_waiting);
+                        let read = read.and_then(|()| rest.check());
+                        (rest, read.map(|()| buffer))
+                    }));
+                }
+                State::Reading(mut reading) => match Pin::new(&mut reading).poll(cx) {
+                    Poll::Ready(Ok((rest, piece))) => {
+                        self.state = State::Ready(rest);
+                        return Poll::Ready(piece);
+                    }
+                    Poll::Ready(Err(e)) => return Poll::Ready(Err(io::Error::other(e))),
+                    Poll::Pending => {
+                        self.state = State::Reading(reading);
+                        return Poll::Pending;
+                    }
+                },
+                State::Ended => return Poll::Ready(Err(io::Error::other("polled after its end"))),
+            }
+        }
+    }
+
+    fn path(&self) -> String {
+        match &self.state {
+            State::Ready(rest) => rest.file.path.display().to_string(),
+            State::Reading(_) | State::Ended => "a dataset".to_owned(),
+        }
+    }
+}
+
+impl Rest {
+    /// Reads on until the buffer holds `wanted` bytes, which there are. An error leaves behind what was
+    /// read before it, and goes on from there when it is called again.
+    fn fill(
+        &mut self,
+        buffer: &mut Buffer,
+        wanted: usize,
+        read: impl Fn(&DatasetFile, &mut [u8], u64) -> io::Result<usize>,
+    ) -> io::Result<()> {
+        while buffer.filled < wanted {
+            let room = &mut buffer.bytes[buffer.filled..wanted];
+            match &mut self.current {
+                Segment::Text(text) if text.has_remaining() => {
+                    let count = text.len().min(room.len());
+                    text.copy_to_slice(&mut room[..count]);
+                    buffer.filled += count;
+                }
+                Segment::File(range) if !range.is_empty() => {
+                    let left = usize::try_from(range.end - range.start).unwrap_or(usize::MAX);
+                    let count = left.min(room.len());
+                    let count = read(&self.file, &mut room[..count], range.start)?;
+                    range.start += count as u64;
+                    buffer.filled += count;
+                }
+                _ => {
+                    let next = self.others.next();
+                    self.current = next.ok_or_else(|| io::Error::other("no more segments"))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses what was read where the file was changed before: that may be blanks, or another's bytes.
+    fn check(&self) -> io::Result<()> {
+        match self.file.is_unchanged() {
+            true => Ok(()),
+            false => Err(io::Error::other("the file was changed while it was sent")),
+        }
+    }
+}
+
+impl FileBody {
+    fn poll_piece(&mut self, cx: &mut Context<'_>) -> Poll<Option<io::Result<Buffer>>> {
+        if self.left == 0 {
+            return Poll::Ready(None);
+        }
+        let piece = ready!(self.read_piece(cx));
+        match &piece {
+            Ok(buffer) => self.left -= buffer.filled as u64,
+            Err(e) => {
+                tracing::warn!("{}: response broken off: {e}", self.path());
+                self.left = 0;
+            }
+        }
+        Poll::Ready(Some(piece))
+    }
+
+    /// The next piece.
+    pub(crate) async fn next(&mut self) -> Option<io::Result<Buffer>> {
+        poll_fn(|cx| self.poll_piece(cx)).await
+    }
 }
 
 impl Body for FileBody {
@@ -119,47 +230,44 @@ impl Body for FileBody {
         mut self: Pin<&mut Self>,
         cx: &mut Context<'_>,
     ) -> Poll<Option<io::Result<Frame<Bytes>>>> {
-        if self.rest.is_empty() {
-            return Poll::Ready(None);
-        }
-        let piece = ready!(self.read_piece(cx));
-        match &piece {
-            Ok(buffer) => self.rest.start += buffer.filled as u64,
-            Err(e) => {
-                tracing::warn!("{}: response broken off: {e}", self.file.path.display());
-                self.rest.start = self.rest.end;
-            }
-        }
-        Poll::Ready(Some(piece.map(|buffer| Frame::data(Bytes::from_owner(buffer)))))
+        let piece = ready!(self.poll_piece(cx));
+        let frame = |buffer| Frame::data(Bytes::from_owner(buffer));
+        Poll::Ready(piece.map(|piece| piece.map(frame)))
     }
 
     fn is_end_stream(&self) -> bool {
-        self.rest.is_empty()
+        self.left == 0
     }
 
     fn size_hint(&self) -> SizeHint {
-        SizeHint::with_exact(self.rest.end - self.rest.start)
+        SizeHint::with_exact(self.left)
     }
 }
 
-/// Reads what can be had without waiting for the disk; returns the bytes read. Where the file
-/// system cannot tell, that is nothing.
-#[cfg(target_os = "linux")]
-fn read_cached(file: &DatasetFile, buffer: &mut [u8], offset: u64) -> usize {
-    use rustix::io::{ReadWriteFlags, preadv2};
-    let mut filled = 0;
-    while filled < buffer.len() {
-        let rest = &mut [io::IoSliceMut::new(&mut buffer[filled..])];
-        let at = offset + filled as u64;
-        match preadv2(file.source.file(), rest, at, ReadWriteFlags::NOWAIT) {
-            Ok(0) | Err(_) => break,
-            Ok(read) => filled += read,
+/// Reads some bytes, waiting for the disk; at least one.
+fn read_waiting(file: &DatasetFile, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
+    match file.source.read_into(buffer, offset)? {
+        0 => {
+            let message = format!("the file was cut short to {offset} bytes");
+            Err(io::Error::new(io::ErrorKind::UnexpectedEof, message))
         }
+        count => Ok(count),
     }
-    filled
+}
+
+/// Reads some bytes that can be had without waiting for the disk; at least one. Where the file system
+/// cannot tell, there are none.
+#[cfg(target_os = "linux")]
+fn read_cached(file: &DatasetFile, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
+    use rustix::io::{ReadWriteFlags, preadv2};
+    let rest = &mut [io::IoSliceMut::new(buffer)];
+    match preadv2(file.source.file(), rest, offset, ReadWriteFlags::NOWAIT)? {
+        0 => Err(io::ErrorKind::WouldBlock.into()),
+        count => Ok(count),
+    }
 }
 
 #[cfg(not(target_os = "linux"))]
-fn read_cached(_: &DatasetFile, _: &mut [u8], _: u64) -> usize {
-    0
+fn read_cached(_: &DatasetFile, _: &mut [u8], _: u64) -> io::Result<usize> {
+    Err(io::ErrorKind::WouldBlock.into())
 }

@@ -77,10 +77,14 @@ impl Validators {
 
     fn is_listed(&self, headers: &HeaderMap, name: HeaderName, comparison: Comparison) -> bool {
         // Our tags hold no comma, so that a foreign one that does cannot be cut into ours.
-        let values = headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
-        values.flat_map(|value| value.split(',')).map(str::trim).any(|tag| {
-            let weak = tag.strip_prefix("W/").filter(|_| comparison == Comparison::Weak);
-            tag == "*" || weak.unwrap_or(tag) == self.etag
+        headers.get_all(name).iter().filter_map(|value| value.to_str().ok()).any(|value| {
+            let mut tags = value.split(',').map(str::trim);
+            // The star is no tag: it stands alone (section 13.1.1).
+            value.trim() == "*"
+                || tags.any(|tag| {
+                    let weak = tag.strip_prefix("W/").filter(|_| comparison == Comparison::Weak);
+                    weak.unwrap_or(tag) == self.etag
+                })
         })
     }
 }
@@ -122,7 +126,7 @@ mod tests {
         for tags in ["\"abc\"", "W/\"abc\"", "*", "\"x\", \"abc\"", "\"x\" ,W/\"abc\",\"y\""] {
             assert_eq!(judge(&[(header::IF_NONE_MATCH, tags)]), Verdict::NotModified, "{tags}");
         }
-        for tags in ["\"x\"", "abc", "", "\"abcd\"", "\"ab,c\""] {
+        for tags in ["\"x\"", "abc", "", "\"abcd\"", "\"ab,c\"", "\"x\", *", "w/\"abc\""] {
             assert_eq!(judge(&[(header::IF_NONE_MATCH, tags)]), Verdict::Proceed, "{tags}");
         }
     }

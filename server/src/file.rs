@@ -1,4 +1,4 @@
-//! One dataset file, opened for one request.
+//! One dataset file, open.
 
 use std::{
     fs::{File, Metadata, OpenOptions},
@@ -7,10 +7,14 @@ use std::{
     time::SystemTime,
 };
 
+use axum::http::HeaderValue;
 use lodestream_preprocess::FileSource;
 use lodestream_protocol::{Error as FormatError, HEADER_BYTES, Header};
 
-use crate::conditional::{Validators, http_date};
+use crate::{
+    conditional::{Validators, http_date},
+    private_copy::CopyState,
+};
 
 /// An open file whose header is sound and which is as long as its header says.
 #[derive(Debug)]
@@ -19,7 +23,39 @@ pub(crate) struct DatasetFile {
     pub(crate) source: FileSource,
     /// Length of the dataset in bytes; what the file may hold beyond it is not served.
     pub(crate) bytes: u64,
+    /// Identity of the content.
+    pub(crate) content_id: [u8; 16],
     pub(crate) validators: Validators,
+    /// The entity tag as a response carries it.
+    pub(crate) etag: HeaderValue,
+    /// The modification time as a response carries it.
+    pub(crate) last_modified: Option<HeaderValue>,
+    pub(crate) private_copy: CopyState,
+    /// Length and modification time when it was opened.
+    opened_as: (u64, Option<SystemTime>),
+}
+
+/// Tells whether a path still leads to the file that was looked at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Identity {
+    length: u64,
+    modified: Option<SystemTime>,
+    /// Device, inode, and when that was last changed in seconds and nanoseconds.
+    #[cfg(unix)]
+    inode: (u64, u64, i64, i64),
+}
+
+impl Identity {
+    pub(crate) fn of(metadata: &Metadata) -> Self {
+        #[cfg(unix)]
+        use std::os::unix::fs::MetadataExt;
+        Self {
+            length: metadata.len(),
+            modified: metadata.modified().ok(),
+            #[cfg(unix)]
+            inode: (metadata.dev(), metadata.ino(), metadata.ctime(), metadata.ctime_nsec()),
+        }
+    }
 }
 
 /// Why a dataset file cannot be served.
@@ -33,7 +69,7 @@ pub(crate) enum OpenError {
 
 impl DatasetFile {
     /// Opens the file and looks at its header.
-    pub(crate) fn open(path: PathBuf) -> Result<Self, OpenError> {
+    pub(crate) fn open(path: PathBuf) -> Result<(Identity, Self), OpenError> {
         let (file, metadata) = open_regular(&path)?;
         let source = FileSource::from(file);
         let mut head = [0; HEADER_BYTES];
@@ -51,7 +87,25 @@ impl DatasetFile {
             etag: format!("\"{}\"", header.content_id_hex()),
             modified: metadata.modified().ok().and_then(|m| http_date(m, SystemTime::now())),
         };
-        Ok(Self { path, source, bytes: header.file_bytes, validators })
+        let file = Self {
+            path,
+            source,
+            bytes: header.file_bytes,
+            content_id: header.content_id,
+            etag: HeaderValue::from_str(&validators.etag).map_err(unreadable)?,
+            last_modified: validators.modified.and_then(|m| m.to_string().try_into().ok()),
+            private_copy: CopyState::default(),
+            opened_as: (length, metadata.modified().ok()),
+            validators,
+        };
+        Ok((Identity::of(&metadata), file))
+    }
+
+    /// Whether nobody has cut the file short or written to it since it was opened. Asked after bytes
+    /// were read: they are those of the dataset then, as a file is shorter before its bytes are gone.
+    pub(crate) fn is_unchanged(&self) -> bool {
+        let metadata = self.source.file().metadata();
+        metadata.is_ok_and(|now| (now.len(), now.modified().ok()) == self.opened_as)
     }
 }
 
@@ -64,14 +118,19 @@ pub(crate) fn open_regular(path: &Path) -> Result<(File, Metadata), OpenError> {
         use std::os::unix::fs::OpenOptionsExt;
         options.custom_flags(rustix::fs::OFlags::NONBLOCK.bits().cast_signed());
     }
-    let file = options.open(path).map_err(|e| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::InvalidFilename => OpenError::Missing,
-        _ => unreadable(e),
-    })?;
+    let file = options.open(path).map_err(missing_or_unreadable)?;
     match file.metadata() {
         Ok(metadata) if metadata.is_file() => Ok((file, metadata)),
         Ok(_) => Err(OpenError::Missing),
         Err(e) => Err(unreadable(e)),
+    }
+}
+
+/// What a failure to reach a file means.
+pub(crate) fn missing_or_unreadable(error: io::Error) -> OpenError {
+    match error.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::InvalidFilename => OpenError::Missing,
+        _ => unreadable(error),
     }
 }
 

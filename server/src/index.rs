@@ -2,10 +2,8 @@
 
 use std::{
     collections::HashMap,
-    fs::Metadata,
     io,
     sync::{Mutex, PoisonError},
-    time::SystemTime,
 };
 
 use lodestream_preprocess::FileSource;
@@ -14,7 +12,7 @@ use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    file::{OpenError, open_regular},
+    file::{Identity, OpenError, open_regular},
     folder::{Folder, dataset_name},
 };
 
@@ -37,6 +35,9 @@ pub struct DatasetEntry {
     pub name: String,
     /// Address, relative to that of the list.
     pub url: String,
+    /// Address of this very content, relative to that of the list: never of another, so that what it
+    /// brings may be kept for good.
+    pub content_url: String,
     /// Elements.
     pub points: u64,
     /// Length of the file in bytes.
@@ -81,28 +82,6 @@ pub struct UnreadableEntry {
     pub file: String,
     /// What is wrong with it.
     pub reason: String,
-}
-
-/// Tells whether a file is still the one that was looked at.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Identity {
-    length: u64,
-    modified: Option<SystemTime>,
-    #[cfg(unix)]
-    device_and_inode: (u64, u64),
-}
-
-impl Identity {
-    fn of(metadata: &Metadata) -> Self {
-        #[cfg(unix)]
-        use std::os::unix::fs::MetadataExt;
-        Self {
-            length: metadata.len(),
-            modified: metadata.modified().ok(),
-            #[cfg(unix)]
-            device_and_inode: (metadata.dev(), metadata.ino()),
-        }
-    }
 }
 
 /// Makes the list, and remembers the entries of files that have not changed since.
@@ -159,9 +138,11 @@ fn entry(file_name: &str, dataset: &Dataset<FileSource>) -> DatasetEntry {
         components: a.components,
         constant: a.group().is_none(),
     };
+    let url = format!("datasets/{}", utf8_percent_encode(file_name, SEGMENT));
     DatasetEntry {
         name: dataset_name(file_name).unwrap_or(file_name).to_owned(),
-        url: format!("datasets/{}", utf8_percent_encode(file_name, SEGMENT)),
+        content_url: format!("{url}?v={}", header.content_id_hex()),
+        url,
         points: manifest.points,
         bytes: header.file_bytes,
         levels: manifest.levels,

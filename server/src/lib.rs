@@ -8,7 +8,8 @@
 //! | --- | --- |
 //! | `GET /` | the list of datasets as a small page |
 //! | `GET /datasets` | the list as JSON: [`DatasetIndex`] |
-//! | `GET`, `HEAD /datasets/NAME.lods`, `/NAME.lods` | the file, whole or by range |
+//! | `GET`, `HEAD /datasets/NAME.lods`, `/NAME.lods` | the file, whole or by range; with `?v=` and its tag, this very content |
+//! | `POST /datasets/NAME.lods/batch`, `/NAME.lods/batch` | many parts of the file by one request |
 //! | `GET /healthz` | `ok` while the folder can be read |
 //!
 //! [`Server`] is bound, then run on the caller's runtime; [`spawn`] runs one on a thread of its
@@ -25,8 +26,12 @@ pub mod describe;
 mod error;
 mod file;
 mod folder;
+mod hot;
 mod index;
+mod multipart;
 mod offload;
+mod open_files;
+mod private_copy;
 mod range;
 mod routes;
 mod running;

@@ -3,11 +3,11 @@
 //! The loop is axum's own, but for what that one does not offer: a limit on connections, timeouts
 //! on slow clients, and an end to draining.
 
-use std::{future::Future, net::SocketAddr, pin::pin, time::Duration};
+use std::{future::Future, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
 
 use axum::Router;
 use hyper_util::server::graceful::GracefulShutdown;
-use tokio::{net::TcpListener, task::JoinSet};
+use tokio::{net::TcpListener, sync::watch, task::JoinSet};
 
 use crate::{
     config::ServeConfig,
@@ -22,6 +22,7 @@ pub struct Server {
     listener: TcpListener,
     addr: SocketAddr,
     router: Router,
+    site: Arc<Site>,
     config: ServeConfig,
 }
 
@@ -35,8 +36,8 @@ impl Server {
         let failed = |source| Error::Listen { addr: config.listen, source };
         let listener = TcpListener::bind(config.listen).await.map_err(failed)?;
         let addr = listener.local_addr().map_err(failed)?;
-        let router = routes::router(site, config.response_timeout);
-        Ok(Self { listener, addr, router, config })
+        let router = routes::router(Arc::clone(&site), config.response_timeout);
+        Ok(Self { listener, addr, router, site, config })
     }
 
     /// The address it listens on, with the port that was taken for port 0.
@@ -51,6 +52,8 @@ impl Server {
         let limits = ConnectionLimits::from(&self.config);
         let graceful = GracefulShutdown::new();
         let mut connections = JoinSet::new();
+        let (stop, stopping) = watch::channel(false);
+        let sweeping = tokio::spawn(Arc::clone(&self.site).sweep());
         let mut shutdown = pin!(shutdown);
         loop {
             tokio::select! {
@@ -61,9 +64,11 @@ impl Server {
                 {
                     match accepted {
                         Ok((stream, _)) => {
-                            let router = self.router.clone();
-                            let watcher = graceful.watcher();
-                            connections.spawn(connection::serve(stream, router, limits, watcher));
+                            let (site, router) = (Arc::clone(&self.site), self.router.clone());
+                            let (watcher, stopping) = (graceful.watcher(), stopping.clone());
+                            connections.spawn(connection::serve(
+                                stream, site, router, limits, watcher, stopping,
+                            ));
                         }
                         Err(e) => recover(&e).await,
                     }
@@ -71,6 +76,8 @@ impl Server {
             }
         }
         drop(self.listener);
+        // It fails only where nobody listens.
+        let _ = stop.send(true);
         let drained = async {
             graceful.shutdown().await;
             while connections.join_next().await.is_some() {}
@@ -79,6 +86,7 @@ impl Server {
             tracing::warn!("{} connections cut off at shutdown", connections.len());
         }
         connections.shutdown().await;
+        sweeping.abort();
     }
 }
 

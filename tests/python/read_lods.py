@@ -236,19 +236,56 @@ def read_values(encoding, data, dtype, components, count):
 
 
 def read_positions(encoding, data, count):
-    """Positions relative to the node's lowest corner: an array of `count` rows of three integers."""
+    """Positions relative to the node's lowest corner, or cells: an array of `count` rows of three integers, and log2 of
+    the side of the cells."""
+    cell_bits = 0
     if encoding == 1:
-        return read_values(encoding, data, "<u4", 3, count).astype(np.uint64)
+        return read_values(encoding, data, "<u4", 3, count).astype(np.uint64), cell_bits
     column = Cursor(data)
     if encoding == 4:
         codes = [int(code) for code in stream(column, "<u8", count)]
     elif encoding == 5:
-        (high, low) = (stream(column, "<u8", count) for _ in range(2))
-        codes = [int(h) << 48 | int(l) for h, l in zip(high, low)]
+        codes = wide_codes(column, count)
+    elif encoding == 6:
+        cell_bits = column.take(1)[0]
+        codes = [int(code) for code in stream(column, "<u8", count)]
     else:
         raise ValueError(f"encoding {encoding} is not one of positions")
     column.finish()
+    return coordinates_of(codes), cell_bits
+
+
+def read_fine_positions(encoding, data, count):
+    """Where in their cells the elements lie, and log2 of the side of these."""
+    require(encoding == 7, f"encoding {encoding} is not one of fine positions")
+    column = Cursor(data)
+    cell_bits = column.take(1)[0]
+    if cell_bits > 21:
+        codes = wide_codes(column, count)
+    else:
+        dtype = "<u2" if cell_bits <= 5 else "<u4" if cell_bits <= 10 else "<u8"
+        codes = [int(code) for code in stream(column, dtype, count)]
+    column.finish()
+    require(all(code >> 3 * cell_bits == 0 for code in codes), "an element is outside of its cell")
+    return coordinates_of(codes), cell_bits
+
+
+def wide_codes(column, count):
+    (high, low) = (stream(column, "<u8", count) for _ in range(2))
+    return [int(h) << 48 | int(l) for h, l in zip(high, low)]
+
+
+def coordinates_of(codes):
     return np.array([[every_third_bit(code >> axis) for axis in range(3)] for code in codes], np.uint64)
+
+
+def cell_bits_of(manifest, node):
+    """log2 of the side of a node's cells, as its level and spacing have it."""
+    lattice = manifest["lattice"]
+    bits = lattice["side_bits"] - node.level
+    side = node.spacing / lattice["scale"] / manifest["fine"]["cells_per_spacing"]
+    log2 = math.frexp(side)[1] - 1 if side >= 1 else 0
+    return max(min(log2, max(bits - 8, 0)), bits - 21)
 
 
 def every_third_bit(code):
@@ -267,12 +304,21 @@ def read_node(file, index, node):
     positions = np.zeros((0, 3), np.uint64)
     values = {}
     texels = 0
+    cell_bits = 0
+    fine_group = manifest["fine"]["group"] if "fine" in manifest else None
     for group, (offset, length, crc) in enumerate(node.payloads):
-        require(bool(length) == bool(node.points), "a payload without elements, or elements without a payload")
+        expected = bool(node.points) and (group != fine_group or cell_bits > 0)
+        require(bool(length) == expected, "a payload without elements, or elements without a payload")
         payload = Cursor(read_bytes(file, index.end + offset, length, crc, "a payload"))
         sizes = index.column_bytes[group]
         if group == 0 and length:
-            positions = read_positions(*take_column(payload), node.points)
+            (positions, cell_bits) = read_positions(*take_column(payload), node.points)
+            require(not cell_bits or cell_bits == cell_bits_of(manifest, node), "cells are not as large as they should be")
+            sizes[0] += payload.at
+        if group == fine_group and length:
+            (offsets, fine_bits) = read_fine_positions(*take_column(payload), node.points)
+            require(fine_bits == cell_bits, "fine positions are of other cells")
+            positions = (positions << np.uint64(cell_bits)) + offsets
             sizes[0] += payload.at
         for i, attribute in enumerate(group_columns(manifest, group), start=int(group == 0)):
             count = texels if is_texel(attribute) else node.points

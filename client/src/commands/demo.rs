@@ -105,6 +105,7 @@ pub fn run(args: DemoArgs) -> anyhow::Result<ExitCode> {
             drop_attributes: Vec::new(),
             columns: None,
             scale: None,
+            cells_per_spacing: lodestream_preprocess::CELLS_PER_SPACING,
             cancel: cancel_on_interrupt()?,
         },
         &progress,
@@ -217,8 +218,11 @@ fn visit(
         if clouds[0].attribute("color").is_some() { ColorMode::Rgb } else { ColorMode::Elevation };
     let settings = RenderSettings { color, ..RenderSettings::new(SIZE_PX, camera) };
     let started = Instant::now();
-    let frame =
-        renderer.render(&Scene { clouds, nodes: &plan.nodes }, &settings, &mut tell_fallback)?;
+    let frame = renderer.render(
+        &Scene { clouds: &plan.clouds, nodes: &plan.nodes },
+        &settings,
+        &mut tell_fallback,
+    )?;
     let draw_ms = started.elapsed().as_secs_f64() * 1e3;
     let picture = format!("{}.png", name.replace(' ', "-"));
     frame.picture.write_png(&folder.join(&picture))?;

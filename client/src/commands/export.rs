@@ -12,6 +12,7 @@ use lodestream_protocol::{Column, Dataset, LatticeBox, Manifest, Node, NodePoint
 use lodestream_server::commands::{TerminalProgress, cancel_on_interrupt, print};
 use rayon::prelude::*;
 
+use crate::interrupt::go_on;
 use crate::source::{BlockingSource, Source};
 
 /// Nodes that are read and decoded at once.
@@ -121,7 +122,7 @@ pub fn run(args: ExportArgs) -> anyhow::Result<ExitCode> {
     let groups: Vec<usize> = (0..manifest.groups.len()).collect();
     let mut written = 0;
     for batch in nodes.chunks(BATCH_NODES) {
-        anyhow::ensure!(!cancel.load(std::sync::atomic::Ordering::Relaxed), "interrupted");
+        go_on(&cancel)?;
         let blocks: Vec<ExportBlock> = batch
             .par_iter()
             .map(|node| {

@@ -56,6 +56,9 @@ pub struct LoadArgs {
     /// Folder for load.html, load.json and tables of CSV; made if it is missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    /// Ask for ranges, even of a host that takes one request for many
+    #[arg(long)]
+    pub no_batches: bool,
     /// Time over which the clients begin
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     pub ramp: Duration,
@@ -117,6 +120,7 @@ pub fn run(args: LoadArgs) -> anyhow::Result<ExitCode> {
         engine: EngineConfig {
             point_budget: args.budget,
             attributes: args.attributes.clone(),
+            batches: !args.no_batches,
             ..EngineConfig::default()
         },
         most_requests: args.most_requests,

@@ -130,6 +130,7 @@ mod tests {
             largest_rounding: 0.0,
             attributes: vec![],
             groups: vec![],
+            fine: None,
             crs: None,
             sources: vec![],
         };

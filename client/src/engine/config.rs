@@ -13,6 +13,9 @@ pub struct EngineConfig {
     /// in pixels. A sampled node's points keep a distance of 1/128 of the cube's side (1/111 of
     /// that radius).
     pub min_size_px: f64,
+    /// Where positions are stored in two parts: the fine part is fetched of nodes whose points lie in
+    /// cells that appear larger than this, in pixels. 0: of all nodes, so that every position is exact.
+    pub cell_px: f64,
     /// Whether nodes outside the picture are left out. (Off to measure what that saves.)
     pub culls_outside: bool,
     /// Whether nodes behind what was drawn are left out, where depths are
@@ -26,6 +29,8 @@ pub struct EngineConfig {
     pub requests_in_flight: usize,
     /// Which neighbouring ranges are fetched with one request.
     pub coalesce: Coalesce,
+    /// Whether one request asks for ranges that are no neighbours, of hosts that take such.
+    pub batches: bool,
     /// In which order wanted pieces are loaded.
     pub order: LoadOrder,
     /// Whether a request is held back while those before it keep the link busy.
@@ -93,12 +98,14 @@ impl Default for EngineConfig {
         Self {
             point_budget: 1_000_000,
             min_size_px: 40.0,
+            cell_px: 0.25,
             culls_outside: true,
             occlusion: true,
             priority: Priority::default(),
             cache_bytes: 512 << 20,
             requests_in_flight: 6,
             coalesce: Coalesce::default(),
+            batches: true,
             order: LoadOrder::Importance,
             paces: true,
             cancels: true,

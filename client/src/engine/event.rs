@@ -1,4 +1,4 @@
-//! What the loader tells the traversal.
+//! What the traversal is told, besides what replaces what was told before.
 
 use std::sync::Arc;
 
@@ -15,13 +15,21 @@ pub(super) enum Content {
     Counted(u64),
 }
 
-/// Something has arrived, or never will.
+/// Something has arrived, or never will; or a cloud comes or goes.
 #[derive(Debug)]
 pub(super) enum Event {
+    /// The caller has added the cloud of that number.
+    Added { cloud: usize, number: usize },
+    /// The caller has removed the cloud of that number.
+    Removed { number: usize },
     /// A cloud's manifest and root page.
     Opened { cloud: usize, boot: Arc<Boot> },
+    /// Another version of the dataset stands in a cloud's place.
+    Replaced { cloud: usize, by: usize, boot: Arc<Boot> },
     /// A cloud can no longer be read.
     CloudFailed { cloud: usize, message: String },
+    /// It can be read again.
+    CloudIsBack { cloud: usize },
     /// The page below a node.
     Page { cloud: usize, parent: NodeKey, page: HierarchyPage },
     /// A column group of a node.

@@ -1,118 +1,142 @@
-//! The letter boxes of the two threads.
+//! The letter boxes of the two threads (`mailbox.rs`).
 //!
-//! Each is one mutex around everything that can be new, and one way to wake its reader, which
-//! checks for news under that mutex: no wake-up can be lost, and there is no second monitor to
-//! lock in another order. The view and the demand are latest-wins; events queue up, bounded by the
-//! loader, which stops asking while too much of what it delivered is unread.
+//! The view, the settings and the demand are latest-wins; events queue up, bounded by the loader, which
+//! stops asking while too much of what it delivered is unread.
 
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-
-use super::{event::Event, occlusion::Drawn, piece::Piece, view::View};
+use super::{
+    event::Event, mailbox::MailBox, occlusion::Drawn, piece::Piece, settings::Settings, view::View,
+};
+use crate::source::Source;
 
 /// What the traversal thread reads.
-#[derive(Debug, Default)]
-pub(super) struct TraversalInbox {
-    state: Mutex<TraversalMail>,
-    news: Condvar,
-    /// The same news for a reader that is a task. Stores one permit.
-    told: tokio::sync::Notify,
-}
+#[derive(Debug)]
+pub(super) struct TraversalInbox(MailBox<TraversalMail>);
 
 /// The newest of everything.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct TraversalMail {
     /// The view, and how often it has changed.
     pub view: Option<View>,
     /// Wanted attributes, where they have changed.
     pub attributes: Option<Vec<String>>,
-    /// Counts changes of the view and of the attributes.
+    /// The settings.
+    pub settings: Settings,
+    /// Counts changes of the view, the attributes, the settings and the clouds.
     pub generation: u64,
     /// The newest picture, where one has been drawn since.
     pub drawn: Option<Drawn>,
-    /// From the loader, oldest first.
+    /// From the loader, and from the caller where clouds come and go; oldest first.
     pub events: Vec<Event>,
     /// Events ever posted.
     pub posted: u64,
     /// Whether to end.
     pub shutdown: bool,
-    unread_view: bool,
+    /// Whether the view or a setting is new.
+    is_changed: bool,
 }
 
 impl TraversalInbox {
+    pub fn new(settings: Settings) -> Self {
+        Self(MailBox::new(TraversalMail {
+            view: None,
+            attributes: None,
+            settings,
+            generation: 0,
+            drawn: None,
+            events: Vec::new(),
+            posted: 0,
+            shutdown: false,
+            is_changed: false,
+        }))
+    }
+
     /// Sets the view; the same view again is no news. Calls `changed` with the new generation
     /// before the traversal can see it. Returns the generation.
     pub fn set_view(&self, view: View, changed: impl FnOnce(u64)) -> u64 {
-        let mut mail = lock(&self.state);
-        if mail.view != Some(view) {
+        self.change(changed, |mail| {
+            let is_news = mail.view != Some(view);
             mail.view = Some(view);
-            mail.unread_view = true;
-            mail.generation += 1;
-            changed(mail.generation);
-            self.tell();
-        }
-        mail.generation
+            mail.is_changed |= is_news;
+            is_news
+        })
     }
 
     /// Sets the wanted attributes. Returns the generation.
     pub fn set_attributes(&self, attributes: Vec<String>, changed: impl FnOnce(u64)) -> u64 {
-        let mut mail = lock(&self.state);
-        mail.attributes = Some(attributes);
-        mail.generation += 1;
-        changed(mail.generation);
-        self.tell();
-        mail.generation
+        self.change(changed, |mail| {
+            mail.attributes = Some(attributes);
+            true
+        })
+    }
+
+    /// Changes the settings; the same settings again are no news. Returns the generation.
+    pub fn set(&self, set: impl FnOnce(&mut Settings), changed: impl FnOnce(u64)) -> u64 {
+        self.change(changed, |mail| {
+            let before = mail.settings.clone();
+            set(&mut mail.settings);
+            let is_news = mail.settings != before;
+            mail.is_changed |= is_news;
+            is_news
+        })
+    }
+
+    /// Posts that a cloud comes or goes.
+    pub fn change_clouds(&self, event: Event, changed: impl FnOnce(u64)) {
+        self.change(changed, |mail| {
+            mail.push(event);
+            true
+        });
+    }
+
+    /// Changes what the caller wants; `change` tells whether that is news.
+    fn change(
+        &self,
+        changed: impl FnOnce(u64),
+        change: impl FnOnce(&mut TraversalMail) -> bool,
+    ) -> u64 {
+        self.0.put(|mail| {
+            let is_news = change(mail);
+            if is_news {
+                mail.generation += 1;
+                changed(mail.generation);
+            }
+            (mail.generation, is_news)
+        })
     }
 
     /// Tells of a picture; one that was not read yet is forgotten.
     pub fn set_drawn(&self, drawn: Drawn) {
-        lock(&self.state).drawn = Some(drawn);
-        self.tell();
+        self.0.put(|mail| (mail.drawn = Some(drawn), true));
     }
 
     /// The newest generation, and whether there is a view at all.
     pub fn generation(&self) -> (u64, bool) {
-        let mail = lock(&self.state);
-        (mail.generation, mail.view.is_some())
+        self.0.look(|mail| (mail.generation, mail.view.is_some()))
     }
 
     /// Posts an event; returns its number, counting from 1.
     pub fn post(&self, event: Event) -> u64 {
-        let mut mail = lock(&self.state);
-        mail.events.push(event);
-        mail.posted += 1;
-        self.tell();
-        mail.posted
+        self.0.put(|mail| (mail.push(event), true))
     }
 
     /// Tells the thread to end.
     pub fn shut_down(&self) {
-        lock(&self.state).shutdown = true;
-        self.tell();
+        self.0.put(|mail| (mail.shutdown = true, true));
     }
 
     /// Waits for news and takes all of it.
     pub fn take(&self) -> TraversalMail {
-        let mut mail = lock(&self.state);
-        while !mail.is_news() {
-            mail = self.news.wait(mail).unwrap_or_else(PoisonError::into_inner);
-        }
-        mail.collect()
+        self.0.take(TraversalMail::collect)
     }
 
     /// Takes all there is, if that is anything.
     pub fn try_take(&self) -> Option<TraversalMail> {
-        let mut mail = lock(&self.state);
-        mail.is_news().then(|| mail.collect())
+        self.0.try_take(TraversalMail::collect)
     }
 
     /// Ends once something has been posted since the last call that ended.
     pub async fn posted(&self) {
-        self.told.notified().await;
-    }
-
-    fn tell(&self) {
-        self.news.notify_one();
-        self.told.notify_one();
+        self.0.told().await;
     }
 }
 
@@ -121,22 +145,34 @@ impl TraversalMail {
         !self.events.is_empty()
             || self.attributes.is_some()
             || self.drawn.is_some()
-            || self.unread_view
+            || self.is_changed
             || self.shutdown
     }
 
-    fn collect(&mut self) -> Self {
-        self.unread_view = false;
-        Self {
+    /// Adds an event; returns its number.
+    fn push(&mut self, event: Event) -> u64 {
+        self.events.push(event);
+        self.posted += 1;
+        self.posted
+    }
+
+    /// All there is, if that is anything.
+    fn collect(&mut self) -> Option<Self> {
+        if !self.is_news() {
+            return None;
+        }
+        self.is_changed = false;
+        Some(Self {
             view: self.view,
             attributes: self.attributes.take(),
+            settings: self.settings.clone(),
             generation: self.generation,
             drawn: self.drawn.take(),
             events: std::mem::take(&mut self.events),
             posted: self.posted,
             shutdown: self.shutdown,
-            unread_view: false,
-        }
+            is_changed: false,
+        })
     }
 }
 
@@ -149,51 +185,61 @@ pub(super) struct Demand {
     pub seen: u64,
 }
 
-/// What the loader thread reads.
-#[derive(Debug, Default)]
-pub(super) struct LoaderInbox {
-    state: Mutex<LoaderMail>,
-    /// Stores one permit: a wake-up before the wait is not lost.
-    news: tokio::sync::Notify,
+/// What the caller wants of the loader.
+#[derive(Debug)]
+pub(super) enum Change {
+    /// Another cloud.
+    Add { cloud: usize, number: usize, source: Source },
+    /// One less.
+    Remove { number: usize },
+    /// Another try to open one, at once.
+    Reopen { number: usize },
 }
+
+/// What the loader thread reads.
+#[derive(Debug)]
+pub(super) struct LoaderInbox(MailBox<LoaderMail>);
 
 /// The newest demand.
 #[derive(Debug, Default)]
 pub(super) struct LoaderMail {
     /// Replaces the one before.
     pub demand: Option<Demand>,
+    /// Oldest first.
+    pub changes: Vec<Change>,
     /// Whether to end.
     pub shutdown: bool,
 }
 
 impl LoaderInbox {
+    pub fn new() -> Self {
+        Self(MailBox::new(LoaderMail::default()))
+    }
+
     /// Replaces the demand.
     pub fn set_demand(&self, demand: Demand) {
-        lock(&self.state).demand = Some(demand);
-        self.news.notify_one();
+        self.0.put(|mail| (mail.demand = Some(demand), true));
+    }
+
+    /// Posts a change.
+    pub fn change(&self, change: Change) {
+        self.0.put(|mail| (mail.changes.push(change), true));
     }
 
     /// Tells the thread to end.
     pub fn shut_down(&self) {
-        lock(&self.state).shutdown = true;
-        self.news.notify_one();
+        self.0.put(|mail| (mail.shutdown = true, true));
     }
 
     /// Waits for news and takes all of it.
     pub async fn take(&self) -> LoaderMail {
-        loop {
-            {
-                let mut mail = lock(&self.state);
-                if mail.demand.is_some() || mail.shutdown {
-                    return LoaderMail { demand: mail.demand.take(), shutdown: mail.shutdown };
-                }
-            }
-            self.news.notified().await;
-        }
+        self.0.taken(LoaderMail::collect).await
     }
 }
 
-/// A thread that panicked while it held a lock leaves whole values behind: every change is a move.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+impl LoaderMail {
+    fn collect(&mut self) -> Option<Self> {
+        let is_news = self.demand.is_some() || !self.changes.is_empty() || self.shutdown;
+        is_news.then(|| std::mem::take(self))
+    }
 }

@@ -6,11 +6,15 @@
 //! - the traversal thread (`traversal.rs`): decides what is drawn and what is loaded;
 //! - the loader thread (`loader/`): requests, decoding, retries.
 //!
-//! They talk through two letter boxes (`inbox.rs`) and one board (`board.rs`). The view and the
+//! They talk through two letter boxes (`inbox.rs`) and one board (`board.rs`), in which no news can be lost
+//! (`mailbox.rs`, `notice.rs`; a model checker tries them in every order). The view, the settings and the
 //! demand are latest-wins, everything else is bounded. With nothing to do, all threads sleep. The
-//! engine knows no GPU: whoever draws takes a [`FramePlan`] and reads its nodes.
+//! engine knows no GPU: whoever draws takes a [`FramePlan`] and reads its nodes. Decoding has threads of its
+//! own, so that it never stands in a queue before those who draw.
 
 mod board;
+mod clip;
+mod clouds;
 mod commons;
 mod config;
 mod depth;
@@ -19,16 +23,20 @@ mod error;
 mod event;
 mod inbox;
 mod loader;
+mod mailbox;
+mod notice;
 mod occlusion;
 mod piece;
 mod plan;
 mod policy;
 mod priority;
 mod selection;
+mod settings;
 mod shared;
 mod simulated;
 mod stats;
 mod store;
+mod sync;
 mod tasked;
 mod traversal;
 mod tree;
@@ -39,6 +47,7 @@ use std::{sync::Arc, thread::JoinHandle, time::Duration};
 use lodestream_protocol::Boot;
 
 pub use board::CloudStatus;
+pub use clip::ClipBox;
 pub use commons::Commons;
 pub use config::{Coalesce, EngineConfig, LoadOrder, Payloads};
 pub use depth::DepthPyramid;
@@ -55,6 +64,7 @@ pub(crate) use view::{Optics, WorldBox};
 
 use self::{
     board::News,
+    inbox::Change,
     loader::Loader,
     occlusion::Drawn,
     shared::{EndOfThread, Shared},
@@ -62,7 +72,11 @@ use self::{
 };
 use crate::source::Source;
 
-/// A running engine. Dropping it ends and joins its threads at once, requests or not.
+/// Most threads that read local files.
+const FILE_THREADS: usize = 8;
+
+/// A running engine. Clouds may come and go, and settings change, while it runs: none of that waits, and
+/// the newest counts. Dropping it ends and joins its threads at once, requests or not.
 #[derive(Debug)]
 pub struct Engine {
     shared: Arc<Shared>,
@@ -70,15 +84,18 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Starts the threads and begins to open the sources; clouds keep the order of `sources`.
+    /// Starts the threads and begins to open the sources; clouds are numbered in the order of `sources`.
     ///
     /// # Errors
     /// [`EngineError::Thread`] where the system gives no thread.
     pub fn start(sources: Vec<Source>, config: EngineConfig) -> Result<Self, EngineError> {
-        let shared = Arc::new(Shared::new(sources.iter().map(Source::describe)));
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        let traversal = Traversal::new(Arc::clone(&shared), &config, sources.len());
-        let loader = Loader::new(Arc::clone(&shared), config, sources);
+        let shared = Arc::new(Shared::new(&config, sources));
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .max_blocking_threads(FILE_THREADS)
+            .build()?;
+        let traversal = Traversal::new(Arc::clone(&shared), &config);
+        let loader = Loader::new(Arc::clone(&shared), config).with_decoders()?;
         // From here on, dropping the engine ends whatever threads it has.
         let mut engine = Self { shared, threads: Vec::new() };
         engine.spawn("traversal", || traversal.run())?;
@@ -104,19 +121,38 @@ impl Engine {
         Ok(())
     }
 
-    /// How the clouds are, in the order of the sources.
+    /// Adds a cloud and begins to open it; counts as a new view. Never waits. Returns the cloud's number, by
+    /// which plans and [`clouds`](Self::clouds) know it; no other cloud ever has it.
+    pub fn add(&self, source: Source) -> usize {
+        self.shared.add(source)
+    }
+
+    /// Removes a cloud and forgets all that is loaded of it; counts as a new view. Never waits. The other
+    /// clouds keep their numbers.
+    pub fn remove(&self, cloud: usize) {
+        self.shared.remove(cloud);
+    }
+
+    /// Tries at once to open a cloud that has failed, or failed in parts. Where its dataset has been replaced
+    /// meanwhile, the new one stands in its place. Never waits. (Clouds that were open are tried again
+    /// from time to time without it.)
+    pub fn reopen(&self, cloud: usize) {
+        self.shared.loader.change(Change::Reopen { number: cloud });
+    }
+
+    /// How the clouds are, by number.
     #[must_use]
     pub fn clouds(&self) -> Vec<CloudStatus> {
         self.shared.board.read(|news| news.clouds.clone())
     }
 
-    /// Waits until every cloud's header, manifest and root page are loaded.
+    /// Waits until the header, manifest and root page of every cloud that was not removed are loaded.
     ///
     /// # Errors
     /// [`EngineError::Cloud`] for the first source that can never be read;
     /// [`EngineError::Timeout`] with the last trouble.
     pub fn wait_open(&self, timeout: Duration) -> Result<Vec<Arc<Boot>>, EngineError> {
-        self.wait(timeout, |news| news.clouds.iter().map(|cloud| cloud.boot.clone()).collect())
+        self.wait(timeout, |news| news.present().map(|cloud| cloud.boot.clone()).collect())
     }
 
     /// Sets the view; the newest one counts. Never waits. Returns the view's number, which
@@ -140,6 +176,40 @@ impl Engine {
         self.shared
             .traversal
             .set_attributes(attributes, |generation| self.shared.start_phase(generation))
+    }
+
+    /// Sets the [point budget](EngineConfig::point_budget); another one counts as a new view. Never
+    /// waits.
+    pub fn set_budget(&self, points: u64) -> u64 {
+        self.shared.set(|settings| settings.point_budget = points)
+    }
+
+    /// Sets the [least size of a node](EngineConfig::min_size_px); another one counts as a new view. Never
+    /// waits.
+    pub fn set_min_size_px(&self, min_size_px: f64) -> u64 {
+        self.shared.set(|settings| settings.min_size_px = min_size_px)
+    }
+
+    /// Limits the view to a box; another one counts as a new view. Never waits.
+    pub fn set_clip(&self, clip: Option<ClipBox>) -> u64 {
+        self.shared.set(|settings| settings.clip = clip)
+    }
+
+    /// Sets whether a cloud is to be seen; a change counts as a new view. A cloud that is not takes nothing
+    /// of the budget, and nothing of it is loaded but what opening brings. Never waits.
+    pub fn set_visible(&self, cloud: usize, is_visible: bool) -> u64 {
+        self.shared.set(|settings| {
+            if is_visible {
+                settings.hidden.remove(&cloud);
+            } else {
+                settings.hidden.insert(cloud);
+            }
+        })
+    }
+
+    /// Sets [how much is kept](EngineConfig::cache_bytes); another size counts as a new view. Never waits.
+    pub fn set_cache_bytes(&self, cache_bytes: u64) -> u64 {
+        self.shared.set(|settings| settings.cache_bytes = cache_bytes)
     }
 
     /// The newest plan. Never waits.
@@ -214,9 +284,9 @@ impl Drop for Engine {
 /// What a plan that is not settled waits for.
 fn describe_missing(news: &News) -> String {
     let plan = &news.plan;
-    let closed = news.clouds.iter().filter(|cloud| cloud.boot.is_none()).count();
+    let closed = news.present().filter(|cloud| cloud.boot.is_none()).count();
     let mut missing = if closed > 0 {
-        format!("{closed} of {} sources are not open", news.clouds.len())
+        format!("{closed} of {} sources are not open", news.present().count())
     } else {
         let pages = plan.pages_loading;
         format!("{} nodes and {pages} hierarchy pages are missing", plan.left_out.loading.nodes)

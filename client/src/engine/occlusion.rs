@@ -32,7 +32,7 @@ use glam::DVec3;
 use super::{
     depth::DepthPyramid,
     piece::NodeId,
-    plan::FramePlan,
+    plan::{DrawNode, FramePlan},
     view::{Optics, View, WorldBox},
 };
 
@@ -58,12 +58,29 @@ pub struct SplatReach {
     pub is_adaptive: bool,
 }
 
+/// A node in a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct DrawnNode {
+    id: NodeId,
+    /// How exactly its points were placed.
+    cell_bits: u8,
+}
+
+impl DrawnNode {
+    pub fn of(node: &DrawNode) -> Self {
+        let id = NodeId { cloud: node.cloud, key: node.key };
+        Self { id, cell_bits: node.points.cell_bits }
+    }
+}
+
 /// What was drawn: the depths of a picture, and what it is of.
 #[derive(Debug, Clone)]
 pub(super) struct Drawn {
     pub view: View,
+    /// Of the plan.
+    pub sequence: u64,
     /// In order.
-    nodes: Vec<NodeId>,
+    nodes: Vec<DrawnNode>,
     depth: Arc<DepthPyramid>,
     reach: SplatReach,
 }
@@ -72,12 +89,12 @@ impl Drawn {
     /// The picture of a plan. `None` where the plan is of no view, or of one of another size.
     pub fn new(plan: &FramePlan, depth: Arc<DepthPyramid>, reach: SplatReach) -> Option<Self> {
         let view = plan.view.filter(|view| view.size_px == depth.size_px())?;
-        let nodes = in_order(plan.nodes.iter().map(|n| NodeId { cloud: n.cloud, key: n.key }));
-        Some(Self { view, nodes, depth, reach })
+        let nodes = in_order(plan.nodes.iter().map(DrawnNode::of));
+        Some(Self { view, sequence: plan.sequence, nodes, depth, reach })
     }
 
     /// Whether it is a picture of these nodes.
-    pub fn is_of(&self, nodes: impl Iterator<Item = NodeId>) -> bool {
+    pub fn is_of(&self, nodes: impl Iterator<Item = DrawnNode>) -> bool {
         self.nodes == in_order(nodes)
     }
 
@@ -87,7 +104,7 @@ impl Drawn {
     }
 }
 
-fn in_order(nodes: impl Iterator<Item = NodeId>) -> Vec<NodeId> {
+fn in_order(nodes: impl Iterator<Item = DrawnNode>) -> Vec<DrawnNode> {
     let mut nodes: Vec<_> = nodes.collect();
     nodes.sort_unstable();
     nodes
@@ -111,6 +128,8 @@ pub(super) struct Occluders<'a> {
     pub in_sight: &'a mut HashSet<NodeId>,
     /// Whether what is not hidden now is to stay in sight.
     pub is_complete: bool,
+    /// Pixels that the cells of a node may take up whose points are not placed exactly.
+    pub cell_px: f64,
 }
 
 impl Occluders<'_> {
@@ -131,8 +150,10 @@ impl Occluders<'_> {
         let spacing_above = if reach.is_adaptive { suspect.spacing_above } else { 0.0 };
         let spacing = suspect.spacing.max(spacing_above);
         let bounds = suspect.bounds;
+        // Points of the nodes above may lie half a cell beside their places.
+        let cell = 0.5 * self.cell_px / optics.largest_scale(&bounds);
         // Of a sphere around the corners of squares.
-        let world = std::f64::consts::SQRT_2 * (reach.world + reach.spacings * spacing);
+        let world = std::f64::consts::SQRT_2 * (reach.world + reach.spacings * spacing) + cell;
         let grown = WorldBox { half: bounds.half + DVec3::splat(world), ..bounds };
         let Some(extent) = optics.extent(&optics.with_rounding(&grown)) else { return false };
         let nearest = extent.nearest * (1.0 - DEPTH_ROUNDING);

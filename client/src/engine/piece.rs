@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use lodestream_protocol::{Node, NodeKey};
 
-/// A node of one of the engine's clouds.
+/// A node of one of the engine's clouds. Here and wherever else the engine speaks of a `cloud`, it means
+/// one version of it: another version, or another cloud, never has the same index, so that nothing of
+/// the one can be taken for the other's. The caller knows clouds by their `number`, which stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct NodeId {
     pub cloud: usize,

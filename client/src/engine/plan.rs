@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lodestream_protocol::{NodeKey, NodePoints};
+use lodestream_protocol::{Manifest, NodeKey, NodePoints};
 use serde::Serialize;
 
 use super::view::View;
@@ -10,7 +10,7 @@ use super::view::View;
 /// A node to draw.
 #[derive(Debug, Clone)]
 pub struct DrawNode {
-    /// Index of the cloud, in the order of the sources given to the engine.
+    /// Number of the cloud: sources given to the engine count from 0. Indexes [`FramePlan::clouds`].
     pub cloud: usize,
     /// The node.
     pub key: NodeKey,
@@ -55,6 +55,8 @@ impl Tally {
 /// not looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct LeftOut {
+    /// Outside the [clip box](super::ClipBox).
+    pub clipped: Tally,
     /// Outside the picture.
     pub outside: Tally,
     /// Behind what is drawn. (The last picture's depths tell:
@@ -80,6 +82,9 @@ pub struct FramePlan {
     pub view_generation: u64,
     /// The view it is made for.
     pub view: Option<View>,
+    /// The clouds by number, as they were when this plan was made: nodes belong to these very versions.
+    /// Those that are not open, or removed, have no points.
+    pub clouds: Arc<[Arc<Manifest>]>,
     /// Nodes to draw, ancestors before descendants, most important first.
     pub nodes: Vec<DrawNode>,
     /// Points in these nodes: never more than the point budget.

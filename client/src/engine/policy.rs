@@ -44,7 +44,9 @@ impl Policy {
     pub fn apply(self, config: EngineConfig) -> EngineConfig {
         // No payloads with the first bytes.
         let apart = EngineConfig {
+            cell_px: 0.0,
             coalesce: Coalesce::NONE,
+            batches: false,
             paces: false,
             cancels: false,
             occlusion: false,

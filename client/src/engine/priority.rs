@@ -36,12 +36,13 @@ const LARGEST_PX: f64 = 1e9;
 ///
 /// Where the budget does not bind, the same nodes come in another order, and 1 % is all there is to gain;
 /// where it does, they are better ones. Without the weight of what is near, indoor views lose 5 %;
-/// Fraiss's weight of the middle changes nothing.
+/// Fraiss's weight of the middle changes nothing of that, and was added afterwards: people look there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Priority {
     /// Those that take away most error for their bytes: pixels of the picture that the node's
-    /// bounds take up, times how often the error there is halved, over the bytes to load; and the
-    /// more the nearer, because what is near is less likely to lie behind something.
+    /// bounds take up, times how often the error there is halved, over the bytes to load; the more the
+    /// nearer, because what is near is less likely to lie behind something; and the more the nearer to the
+    /// middle (Fraiss 2017, eq. 3.4).
     #[default]
     ErrorPerByte,
     /// The largest, and those in the middle of the picture. (Fraiss 2017, eqs. 3.2-3.4)
@@ -68,6 +69,7 @@ impl Priority {
                 let seen = |error: f64| (error * scale).min(LARGEST_PX) + SEEN_PX;
                 let halvings = (seen(change.error_before) / seen(change.error_after)).log2();
                 let gain = optics.area(bounds) * halvings.max(0.0) * scale;
+                let gain = optics.priority(bounds.center, gain);
                 (gain / (change.bytes as f64 + COST_BYTES)).max(0.0)
             }
             Self::Fraiss => {

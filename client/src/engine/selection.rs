@@ -14,9 +14,10 @@ use std::{
     sync::Arc,
 };
 
-use lodestream_protocol::{Lattice, LatticeBox, Node, NodeKey, Refinement};
+use lodestream_protocol::{Lattice, LatticeBox, Manifest, Node, NodeKey, Refinement};
 
 use super::{
+    clip::ClipBox,
     occlusion::{Occluders, Suspect},
     piece::NodeId,
     plan::{LeftOut, Tally},
@@ -35,8 +36,10 @@ const HYSTERESIS: f64 = 1.1;
 pub(super) struct Limits {
     pub point_budget: u64,
     pub min_size_px: f64,
+    pub cell_px: f64,
     pub culls_outside: bool,
     pub priority: Priority,
+    pub clip: Option<ClipBox>,
 }
 
 /// A wanted node.
@@ -53,6 +56,8 @@ pub(super) struct Pick {
     pub priority: f64,
     /// Points that this node or what stands in for it may come to.
     pub reserved: u64,
+    /// Whether its positions are to be exact.
+    pub is_exact: bool,
 }
 
 /// What a view wants.
@@ -145,6 +150,7 @@ impl Eq for Candidate {}
 
 /// How a node stands in the view.
 enum Sight {
+    Clipped,
     Outside,
     Hidden,
     Small { priority: f64 },
@@ -168,6 +174,7 @@ impl Walk<'_> {
         // The root has no parent to stand for it: it is shown however small it is.
         match self.look(cloud, &place.node, None) {
             Sight::Hidden => {}
+            Sight::Clipped => self.out.left_out.clipped.add(place.node.points),
             Sight::Outside => self.out.left_out.outside.add(place.node.points),
             Sight::Small { priority } | Sight::Seen { priority } => {
                 self.push(cloud, &place.node.clone(), priority, What::Node { place, parent: None });
@@ -243,9 +250,12 @@ impl Walk<'_> {
         parent: Option<usize>,
         priority: f64,
     ) -> usize {
-        let refinement = match &self.trees[cloud] {
-            Some(tree) => tree.boot().manifest.refinement,
-            None => Refinement::Additive,
+        let (refinement, is_exact) = match &self.trees[cloud] {
+            Some(tree) => {
+                let manifest = &tree.boot().manifest;
+                (manifest.refinement, self.shows_cells(manifest, node))
+            }
+            None => (Refinement::Additive, false),
         };
         self.out.picks.push(Pick {
             id: NodeId { cloud, key: node.key },
@@ -255,8 +265,22 @@ impl Walk<'_> {
             family: None,
             priority,
             reserved: u64::from(node.points),
+            is_exact,
         });
         self.out.picks.len() - 1
+    }
+
+    /// Whether the cells that a node's points lie in are large enough to be seen.
+    fn shows_cells(&self, manifest: &Manifest, node: &Node) -> bool {
+        let cell_bits = manifest.cell_bits(node.key.level(), node.spacing);
+        if cell_bits == 0 {
+            return false;
+        }
+        let cell_world = f64::from(cell_bits).exp2() * manifest.lattice.scale;
+        let bounds = WorldBox::of(&node.bounds, &manifest.lattice);
+        let cell_px = cell_world * self.optics.largest_scale(&bounds);
+        // Where the numbers are no numbers, too.
+        cell_px.partial_cmp(&self.limits.cell_px).is_none_or(Ordering::is_gt)
     }
 
     /// Reserves points for the children of a replaced node and returns by how much the whole grows,
@@ -312,6 +336,7 @@ impl Walk<'_> {
         let above = Arc::clone(&self.out.picks[parent].node);
         for place in children {
             match self.look(cloud, &place.node, Some(&above)) {
+                Sight::Clipped => self.out.left_out.clipped.add(place.node.points),
                 Sight::Outside => self.out.left_out.outside.add(place.node.points),
                 Sight::Hidden => self.out.left_out.hidden.add(place.node.points),
                 Sight::Small { .. } => self.out.left_out.small.add(place.node.points),
@@ -332,6 +357,7 @@ impl Walk<'_> {
         let mut most: Option<f64> = None;
         for place in children {
             match self.look(cloud, &place.node, Some(&above)) {
+                Sight::Clipped => self.out.left_out.clipped.add(place.node.points),
                 Sight::Outside => self.out.left_out.outside.add(place.node.points),
                 Sight::Hidden => self.out.left_out.hidden.add(place.node.points),
                 Sight::Small { priority } => {
@@ -355,6 +381,10 @@ impl Walk<'_> {
         }
     }
 
+    fn is_clipped(&self, bounds: &WorldBox) -> bool {
+        self.limits.clip.is_some_and(|clip| clip.excludes(bounds))
+    }
+
     fn is_outside(&self, bounds: &WorldBox) -> bool {
         self.limits.culls_outside && self.optics.is_outside(bounds)
     }
@@ -364,6 +394,9 @@ impl Walk<'_> {
         let Some(tree) = &self.trees[cloud] else { return Sight::Outside };
         let lattice = &tree.boot().manifest.lattice;
         let bounds = WorldBox::of(&node.bounds, lattice);
+        if self.is_clipped(&bounds) {
+            return Sight::Clipped;
+        }
         if self.is_outside(&bounds) {
             return Sight::Outside;
         }
@@ -417,7 +450,9 @@ impl Walk<'_> {
             let octant = WorldBox::of(&octant, lattice);
             let cube = cube_radius(lattice.node_side_world(key.level()));
             let largest = HYSTERESIS * self.optics.largest_projected_size(&octant, cube);
-            !self.is_outside(&octant) && largest >= self.limits.min_size_px
+            !self.is_clipped(&octant)
+                && !self.is_outside(&octant)
+                && largest >= self.limits.min_size_px
         })
     }
 }
@@ -575,6 +610,7 @@ mod tests {
             largest_rounding: 0.0,
             attributes: vec![],
             groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
+            fine: None,
             crs: None,
             sources: vec![],
         }
@@ -588,9 +624,11 @@ mod tests {
 
     const LIMITS: Limits = Limits {
         point_budget: 8000,
+        cell_px: 0.25,
         min_size_px: 20.0,
         culls_outside: true,
         priority: Priority::ErrorPerByte,
+        clip: None,
     };
 
     /// Of a forest, wanting the only group.

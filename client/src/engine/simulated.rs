@@ -41,9 +41,9 @@ impl SimulatedEngine {
         let runtime = runtime.enable_time().start_paused(true).build()?;
         let entered = runtime.enter();
         let start = Instant::now();
-        let shared = Arc::new(Shared::new(sources.iter().map(Source::describe)));
-        let traversal = Traversal::new(Arc::clone(&shared), &config, sources.len());
-        let loader = Loader::new(Arc::clone(&shared), config, sources).decoding_inline();
+        let shared = Arc::new(Shared::new(&config, sources));
+        let traversal = Traversal::new(Arc::clone(&shared), &config);
+        let loader = Loader::new(Arc::clone(&shared), config);
         runtime.spawn(loader.run());
         drop(entered);
         Ok(Self { shared, traversal, runtime, start, now: start })

@@ -34,12 +34,16 @@ impl Counter {
 pub(super) struct Counters {
     pub requests: Counter,
     pub bytes: Counter,
+    pub useful_bytes: Counter,
+    pub gap_bytes: Counter,
     pub retries: Counter,
     pub cancelled: Counter,
     pub damaged: Counter,
     pub page_bytes: Counter,
     pub decoded_nodes: Counter,
     pub decode_nanos: Counter,
+    pub plans: Counter,
+    pub plan_nanos: Counter,
     pub cache_hits: Counter,
     pub evictions: Counter,
     pub queued: Counter,
@@ -53,12 +57,16 @@ impl Counters {
         Totals {
             requests: self.requests.get(),
             bytes: self.bytes.get(),
+            useful_bytes: self.useful_bytes.get(),
+            gap_bytes: self.gap_bytes.get(),
             retries: self.retries.get(),
             cancelled: self.cancelled.get(),
             damaged: self.damaged.get(),
             page_bytes: self.page_bytes.get(),
             decoded_nodes: self.decoded_nodes.get(),
             decode_ms: Duration::from_nanos(self.decode_nanos.get()).as_secs_f64() * 1e3,
+            plans: self.plans.get(),
+            plan_ms: Duration::from_nanos(self.plan_nanos.get()).as_secs_f64() * 1e3,
             cache_hits: self.cache_hits.get(),
             evictions: self.evictions.get(),
         }
@@ -72,6 +80,10 @@ pub struct Totals {
     pub requests: u64,
     /// Bytes of bodies received, including those that were of no use.
     pub bytes: u64,
+    /// Of these, the bytes of nodes, hierarchy pages and indices that were wanted when they had come.
+    pub useful_bytes: u64,
+    /// Of these, the bytes between pieces that were asked for together.
+    pub gap_bytes: u64,
     /// Requests that failed and whose bytes had to be asked for again.
     pub retries: u64,
     /// Requests broken off because the view had moved on.
@@ -84,6 +96,10 @@ pub struct Totals {
     pub decoded_nodes: u64,
     /// Milliseconds spent decoding, summed over threads.
     pub decode_ms: f64,
+    /// Plans made.
+    pub plans: u64,
+    /// Milliseconds spent making them.
+    pub plan_ms: f64,
     /// Nodes that a view needed and that were still in the cache.
     pub cache_hits: u64,
     /// Nodes dropped from the cache.
@@ -91,16 +107,27 @@ pub struct Totals {
 }
 
 impl Totals {
+    /// Bytes that the view had left when they came, or that came of requests that were broken off or
+    /// failed.
+    #[must_use]
+    pub const fn wasted_bytes(&self) -> u64 {
+        self.bytes.saturating_sub(self.useful_bytes + self.gap_bytes)
+    }
+
     fn since(self, earlier: Self) -> Self {
         Self {
             requests: self.requests - earlier.requests,
             bytes: self.bytes - earlier.bytes,
+            useful_bytes: self.useful_bytes - earlier.useful_bytes,
+            gap_bytes: self.gap_bytes - earlier.gap_bytes,
             retries: self.retries - earlier.retries,
             cancelled: self.cancelled - earlier.cancelled,
             damaged: self.damaged - earlier.damaged,
             page_bytes: self.page_bytes - earlier.page_bytes,
             decoded_nodes: self.decoded_nodes - earlier.decoded_nodes,
             decode_ms: self.decode_ms - earlier.decode_ms,
+            plans: self.plans - earlier.plans,
+            plan_ms: self.plan_ms - earlier.plan_ms,
             cache_hits: self.cache_hits - earlier.cache_hits,
             evictions: self.evictions - earlier.evictions,
         }

@@ -68,40 +68,51 @@ impl Store {
         }
     }
 
+    /// Changes the limit; the next [`pin`](Self::pin) keeps to it.
+    pub fn set_cache_limit(&mut self, bytes: u64) {
+        self.cache_limit = bytes;
+    }
+
+    /// Forgets all of a cloud.
+    pub fn forget(&mut self, cloud: usize) {
+        for (_, resident) in self.pinned.extract_if(|id, _| id.cloud == cloud) {
+            self.pinned_bytes -= resident.bytes;
+        }
+        let of_cloud = self.cached.iter().map(|(id, _)| *id).filter(|id| id.cloud == cloud);
+        for id in of_cloud.collect::<Vec<_>>() {
+            if let Some(resident) = self.cached.pop(&id) {
+                self.cached_bytes -= resident.bytes;
+            }
+        }
+        self.fresh.retain(|id| id.cloud != cloud);
+        self.find(cloud);
+    }
+
     /// Adds a group. Call [`pin`](Self::pin) afterwards: until then it counts as cached.
     pub fn add(&mut self, id: NodeId, group: usize, content: Content) {
         let (resident, total) = if let Some(resident) = self.pinned.get_mut(&id) {
             (resident, &mut self.pinned_bytes)
         } else {
-            let empty = || Resident {
-                points: Arc::new(NodePoints {
-                    key: id.key,
-                    positions: Vec::new(),
-                    columns: Vec::new(),
-                }),
-                groups: 0,
-                bytes: 0,
-            };
+            let empty =
+                || Resident { points: Arc::new(NodePoints::new(id.key)), groups: 0, bytes: 0 };
             (self.cached.get_or_insert_mut(id, empty), &mut self.cached_bytes)
         };
         if resident.groups & group_bit(group) != 0 {
             return;
         }
-        resident.groups |= group_bit(group);
-        self.fresh.insert(id);
         let bytes = match content {
             Content::Decoded(decoded) => {
                 // Copies where a plan holds the points: a further group came after the first picture.
-                let points = Arc::make_mut(&mut resident.points);
-                if group == 0 {
-                    points.positions = decoded.positions;
+                if Arc::make_mut(&mut resident.points).add(decoded).is_err() {
+                    // Fine positions of a node that was dropped meanwhile: they will be asked for again.
+                    return;
                 }
-                points.columns.extend(decoded.columns);
-                points.columns.sort_by_key(|column| column.attribute);
-                size_bytes(points)
+                size_bytes(&resident.points)
             }
             Content::Counted(bytes) => resident.bytes + bytes,
         };
+        resident.groups |= group_bit(group);
+        self.fresh.insert(id);
         *total += bytes - resident.bytes;
         resident.bytes = bytes;
     }
@@ -150,6 +161,11 @@ impl Store {
         self.lost.insert(id);
     }
 
+    /// What was lost of a cloud may be had after all.
+    pub fn find(&mut self, cloud: usize) {
+        self.lost.retain(|id| id.node.cloud != cloud);
+    }
+
     /// Whether a piece can never be had.
     pub fn is_lost(&self, id: PieceId) -> bool {
         self.lost.contains(&id)
@@ -179,6 +195,7 @@ mod tests {
     use lodestream_protocol::{Column, DecodedGroup, NodeKey};
 
     use super::*;
+    use crate::engine::piece::Part;
 
     fn id(octant: u8) -> NodeId {
         NodeId { cloud: 0, key: NodeKey::ROOT.child(octant).expect("below the root") }
@@ -186,7 +203,8 @@ mod tests {
 
     /// 12 bytes a point.
     fn base(points: usize) -> Content {
-        Content::Decoded(DecodedGroup { positions: vec![[1, 2, 3]; points], columns: vec![] })
+        let positions = vec![[1, 2, 3]; points];
+        Content::Decoded(DecodedGroup { positions, ..DecodedGroup::default() })
     }
 
     fn store(cache_limit: u64, nodes: u8) -> Store {
@@ -218,11 +236,25 @@ mod tests {
     }
 
     #[test]
+    fn a_forgotten_cloud_leaves_nothing_and_the_others_alone() {
+        let mut store = store(1000, 2);
+        let other = NodeId { cloud: 1, ..id(0) };
+        store.add(other, 0, base(10));
+        store.lose(PieceId { node: id(3), part: Part::Page });
+        store.pin(&HashSet::from([id(0), other]));
+        store.forget(0);
+        assert_eq!((store.pinned_bytes(), store.cached_bytes()), (120, 0));
+        assert!(store.points(other).is_some() && store.groups(id(0)) == 0 && !store.has_lost());
+        store.forget(1);
+        assert_eq!((store.pinned_bytes(), store.cached_bytes()), (0, 0));
+    }
+
+    #[test]
     fn groups_join_in_any_order_and_leave_shared_points_alone() {
         let columns = vec![Column { attribute: 1, bytes: vec![0; 20] }];
         let further = || {
             let columns = columns.clone();
-            Content::Decoded(DecodedGroup { positions: vec![], columns })
+            Content::Decoded(DecodedGroup { columns, ..DecodedGroup::default() })
         };
         let mut store = Store::new(1000);
         store.add(id(0), 1, further());

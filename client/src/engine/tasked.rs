@@ -25,11 +25,9 @@ impl TaskedEngine {
     /// Begins to open the sources. To be called within a runtime that has time and I/O.
     #[must_use]
     pub fn start(sources: Vec<Source>, config: EngineConfig, commons: Arc<Commons>) -> Self {
-        let shared = Arc::new(Shared::new(sources.iter().map(Source::describe)));
-        let traversal = Traversal::new(Arc::clone(&shared), &config, sources.len())
-            .sharing(Arc::clone(&commons));
-        let loader =
-            Loader::new(Arc::clone(&shared), config, sources).decoding_inline().sharing(commons);
+        let shared = Arc::new(Shared::new(&config, sources));
+        let traversal = Traversal::new(Arc::clone(&shared), &config).sharing(Arc::clone(&commons));
+        let loader = Loader::new(Arc::clone(&shared), config).sharing(commons);
         let loader = tokio::spawn(loader.run()).abort_handle();
         Self { shared, traversal, loader }
     }

@@ -7,18 +7,23 @@
 //! Node states and who knows them: unknown (nobody), queued, loading and failed-until (the loader),
 //! resident and lost (the store here), shown (in the plan).
 
-use std::{collections::HashSet, sync::Arc};
+use std::{collections::HashSet, sync::Arc, time::Instant};
+
+use lodestream_protocol::Boot;
 
 use super::{
+    board::CloudStatus,
+    clouds::Clouds,
     commons::Commons,
     config::EngineConfig,
     drawing::{self, Presence},
     event::Event,
     inbox::{Demand, TraversalMail},
-    occlusion::{Drawn, Occluders},
+    occlusion::{Drawn, DrawnNode, Occluders},
     piece::{NodeId, Part, Piece, PieceId},
     plan::{DrawNode, FramePlan, WantedNode},
     selection::{self, Limits, Pick, Selection},
+    settings::Settings,
     shared::Shared,
     store::{GroupMask, Store, group_bit},
     tree::Tree,
@@ -33,8 +38,11 @@ pub(super) struct Traversal {
     shared: Arc<Shared>,
     limits: Limits,
     attributes: Vec<String>,
+    settings: Settings,
     clouds: Vec<Cloud>,
     trees: Vec<Option<Tree>>,
+    /// For those who draw.
+    manifests: Clouds,
     store: Store,
     view: Option<View>,
     view_generation: u64,
@@ -45,10 +53,12 @@ pub(super) struct Traversal {
     occlusion: bool,
     /// The newest picture of the view.
     drawn: Option<Drawn>,
+    /// Pictures up to that plan's show what is not to be seen any more.
+    outdated: u64,
     /// Nodes of the view that are not to be taken for hidden.
     in_sight: HashSet<NodeId>,
-    /// What the newest plan draws.
-    shown: Vec<NodeId>,
+    /// What the newest plan draws, and how exactly.
+    shown: Vec<DrawnNode>,
     /// What the newest plan wants: indices into the selection.
     needed: Vec<usize>,
     /// Where other engines may have the same pages.
@@ -60,24 +70,34 @@ pub(super) struct Traversal {
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Cloud {
-    /// Groups that a complete node has.
+    /// By which the caller knows it.
+    number: usize,
+    /// Groups that a complete node has, but for fine positions.
     groups: GroupMask,
+    /// The group of fine positions, where the cloud has any.
+    fine: GroupMask,
     failed: bool,
+    /// Whether it was removed, or another version stands in its place.
+    gone: bool,
 }
 
 impl Traversal {
-    pub fn new(shared: Arc<Shared>, config: &EngineConfig, clouds: usize) -> Self {
+    pub fn new(shared: Arc<Shared>, config: &EngineConfig) -> Self {
         Self {
             shared,
             limits: Limits {
                 point_budget: config.point_budget,
                 min_size_px: config.min_size_px,
+                cell_px: config.cell_px,
                 culls_outside: config.culls_outside,
                 priority: config.priority,
+                clip: None,
             },
             attributes: config.attributes.clone(),
-            clouds: vec![Cloud::default(); clouds],
-            trees: (0..clouds).map(|_| None).collect(),
+            settings: Settings::new(config),
+            clouds: Vec::new(),
+            trees: Vec::new(),
+            manifests: Clouds::new(),
             store: Store::new(config.cache_bytes),
             view: None,
             view_generation: 0,
@@ -85,6 +105,7 @@ impl Traversal {
             previous: HashSet::new(),
             occlusion: config.occlusion,
             drawn: None,
+            outdated: 0,
             in_sight: HashSet::new(),
             shown: Vec::new(),
             needed: Vec::new(),
@@ -103,11 +124,12 @@ impl Traversal {
     pub fn wanted(&self) -> impl Iterator<Item = WantedNode> {
         self.needed.iter().map(|&i| {
             let pick = &self.selection.picks[i];
-            let groups = self.clouds[pick.id.cloud].groups;
+            let cloud = self.clouds[pick.id.cloud];
+            let groups = cloud.groups | if pick.is_exact { cloud.fine } else { 0 };
             let payloads = pick.node.payloads.iter().enumerate();
             let wanted = payloads.filter(|(group, _)| groups & group_bit(*group) != 0);
             WantedNode {
-                cloud: pick.id.cloud,
+                cloud: cloud.number,
                 key: pick.id.key,
                 bytes: wanted.map(|(_, payload)| u64::from(payload.bytes)).sum(),
                 is_there: groups & !self.store.groups(pick.id) == 0,
@@ -140,15 +162,19 @@ impl Traversal {
             return;
         }
         reselect |= is_new;
+        let begin = Instant::now();
         if reselect {
             self.select();
         }
         self.publish(seen);
+        let counters = &self.shared.counters;
+        counters.plans.add(1);
+        counters.plan_nanos.add(u64::try_from(begin.elapsed().as_nanos()).unwrap_or(u64::MAX));
     }
 
     /// Takes in a picture; returns whether it is news.
     fn see(&mut self, drawn: Drawn) -> bool {
-        let is_of_view = Some(drawn.view) == self.view;
+        let is_of_view = Some(drawn.view) == self.view && drawn.sequence > self.outdated;
         let is_new = self.drawn.as_ref().is_none_or(|last| !last.is_same(&drawn));
         let is_news = self.occlusion && is_of_view && is_new;
         if is_news {
@@ -167,6 +193,10 @@ impl Traversal {
             self.in_sight.clear();
             reselect = true;
         }
+        if mail.settings != self.settings {
+            self.apply(mail.settings);
+            reselect = true;
+        }
         self.view_generation = mail.generation;
         if let Some(attributes) = mail.attributes {
             self.attributes = attributes;
@@ -176,18 +206,47 @@ impl Traversal {
         }
         for event in mail.events {
             match event {
+                Event::Added { cloud, number } => {
+                    self.clouds.resize(self.clouds.len().max(cloud + 1), Cloud::default());
+                    self.trees.resize_with(self.clouds.len(), || None);
+                    self.clouds[cloud].number = number;
+                    self.manifests.set(number, None);
+                }
+                Event::Removed { number } => {
+                    self.remove(number);
+                    reselect = true;
+                }
+                // The loader tells on for a while of clouds that were removed.
+                Event::Opened { cloud, .. }
+                | Event::Replaced { cloud, .. }
+                | Event::CloudFailed { cloud, .. }
+                | Event::CloudIsBack { cloud }
+                | Event::Group { node: NodeId { cloud, .. }, .. }
+                | Event::Lost { piece: PieceId { node: NodeId { cloud, .. }, .. }, .. }
+                    if self.clouds[cloud].gone => {}
                 Event::Opened { cloud, boot } => {
-                    self.trees[cloud] = Some(Tree::new(Arc::clone(&boot), self.commons.clone()));
-                    self.update_groups(cloud);
-                    self.shared.board.post(|news| news.clouds[cloud].boot = Some(boot));
+                    self.open(cloud, boot);
+                    reselect = true;
+                }
+                Event::Replaced { cloud, by, boot } => {
+                    self.clouds.resize(self.clouds.len().max(by + 1), Cloud::default());
+                    self.trees.resize_with(self.clouds.len(), || None);
+                    self.clouds[by].number = self.clouds[cloud].number;
+                    self.drop_version(cloud);
+                    self.open(by, boot);
+                    let number = self.clouds[by].number;
+                    self.post(number, |status| status.replaced += 1);
                     reselect = true;
                 }
                 Event::CloudFailed { cloud, message } => {
                     self.clouds[cloud].failed = true;
-                    self.shared.board.post(|news| {
-                        news.clouds[cloud].failure = Some(message.clone());
-                        news.add_problem(message);
-                    });
+                    self.post(self.clouds[cloud].number, |s| s.failure = Some(message.clone()));
+                    self.shared.board.post(|news| news.add_problem(message));
+                }
+                Event::CloudIsBack { cloud } => {
+                    self.clouds[cloud].failed = false;
+                    self.store.find(cloud);
+                    self.post(self.clouds[cloud].number, |status| status.failure = None);
                 }
                 Event::Page { cloud, parent, page } => {
                     if let Some(tree) = &mut self.trees[cloud] {
@@ -207,6 +266,63 @@ impl Traversal {
         reselect
     }
 
+    /// What lies behind the last picture may be in sight now.
+    fn forget_picture(&mut self) {
+        self.drawn = None;
+        self.in_sight.clear();
+        self.outdated = self.sequence;
+    }
+
+    fn apply(&mut self, settings: Settings) {
+        if settings.clip != self.settings.clip || settings.hidden != self.settings.hidden {
+            self.forget_picture();
+        }
+        self.limits.point_budget = settings.point_budget;
+        self.limits.min_size_px = settings.min_size_px;
+        self.limits.clip = settings.clip;
+        self.store.set_cache_limit(settings.cache_bytes);
+        self.settings = settings;
+        for (tree, cloud) in self.trees.iter_mut().zip(&self.clouds) {
+            let is_hidden = self.settings.hidden.contains(&cloud.number);
+            tree.iter_mut().for_each(|tree| tree.hide(is_hidden));
+        }
+    }
+
+    fn open(&mut self, cloud: usize, boot: Arc<Boot>) {
+        let number = self.clouds[cloud].number;
+        let mut tree = Tree::new(Arc::clone(&boot), self.commons.clone());
+        tree.hide(self.settings.hidden.contains(&number));
+        self.trees[cloud] = Some(tree);
+        self.clouds[cloud].failed = false;
+        self.update_groups(cloud);
+        self.manifests.set(number, Some(&boot));
+        self.post(number, |status| {
+            status.boot = Some(boot);
+            status.failure = None;
+        });
+    }
+
+    /// Another version stands in the cloud's place, or none.
+    fn drop_version(&mut self, cloud: usize) {
+        self.clouds[cloud].gone = true;
+        self.trees[cloud] = None;
+        self.store.forget(cloud);
+        self.forget_picture();
+    }
+
+    fn remove(&mut self, number: usize) {
+        for cloud in 0..self.clouds.len() {
+            if self.clouds[cloud].number == number && !self.clouds[cloud].gone {
+                self.drop_version(cloud);
+            }
+        }
+        self.manifests.set(number, None);
+    }
+
+    fn post(&self, number: usize, change: impl FnOnce(&mut CloudStatus)) {
+        self.shared.board.post(|news| news.cloud(number, change));
+    }
+
     /// Works out which groups the view needs of a cloud.
     fn update_groups(&mut self, cloud: usize) {
         let Some(tree) = &self.trees[cloud] else { return };
@@ -217,6 +333,7 @@ impl Traversal {
             .chain(wanted)
             .filter_map(|name| manifest.attribute(name)?.group())
             .fold(group_bit(0), |mask, group| mask | group_bit(group));
+        self.clouds[cloud].fine = manifest.fine.map_or(0, |fine| group_bit(fine.group));
     }
 
     fn select(&mut self) {
@@ -228,6 +345,7 @@ impl Traversal {
         let occluders = drawn.map(|drawn| Occluders {
             drawn,
             in_sight: &mut self.in_sight,
+            cell_px: self.limits.cell_px,
             is_complete: self.is_loaded && drawn.is_of(self.shown.iter().copied()),
         });
         let (limits, previous) = (self.limits, &self.previous);
@@ -244,6 +362,7 @@ impl Traversal {
         let mut plan = FramePlan {
             view_generation: self.view_generation,
             view: self.view,
+            clouds: self.manifests.list(),
             points_wanted: self.selection.points,
             left_out: self.selection.left_out,
             cached_bytes: self.store.cached_bytes(),
@@ -254,7 +373,7 @@ impl Traversal {
             if let Some(points) = self.store.points(pick.id) {
                 plan.points += u64::from(pick.node.points);
                 plan.nodes.push(DrawNode {
-                    cloud: pick.id.cloud,
+                    cloud: self.clouds[pick.id.cloud].number,
                     key: pick.id.key,
                     spacing: pick.node.spacing,
                     points: Arc::clone(points),
@@ -263,19 +382,26 @@ impl Traversal {
         }
         let mut pieces = self.missing_pages();
         plan.pages_loading = pieces.len() as u64;
+        // Every node roughly before any of them exactly.
+        let mut fine = Vec::new();
         for &i in &drawing.needed {
             let pick = &self.selection.picks[i];
             let before = pieces.len();
-            self.missing_groups(pick, &mut pieces);
+            self.missing_groups(pick, self.clouds[pick.id.cloud].groups, &mut pieces);
             if pieces.len() > before {
                 plan.left_out.loading.add(pick.node.points);
             } else if self.presence(pick) == Presence::Lost {
                 plan.left_out.failed.add(pick.node.points);
+            } else if pick.is_exact {
+                self.missing_groups(pick, self.clouds[pick.id.cloud].fine, &mut fine);
             }
         }
-        let all_open =
-            self.trees.iter().zip(&self.clouds).all(|(tree, cloud)| tree.is_some() || cloud.failed);
-        self.shown = plan.nodes.iter().map(|n| NodeId { cloud: n.cloud, key: n.key }).collect();
+        pieces.append(&mut fine);
+        let all_open = self.trees.iter().zip(&self.clouds).all(|(tree, cloud)| {
+            let is_hidden = self.settings.hidden.contains(&cloud.number);
+            tree.is_some() || cloud.failed || cloud.gone || is_hidden
+        });
+        self.shown = plan.nodes.iter().map(DrawnNode::of).collect();
         self.is_loaded = self.view.is_some() && all_open && pieces.is_empty();
         self.needed = drawing.needed;
         plan.settled = self.is_loaded && self.hides_rightly();
@@ -329,11 +455,10 @@ impl Traversal {
             .collect()
     }
 
-    /// Adds the groups that a node still lacks.
-    fn missing_groups(&self, pick: &Pick, pieces: &mut Vec<Piece>) {
-        let cloud = self.clouds[pick.id.cloud];
-        let missing = cloud.groups & !self.store.groups(pick.id);
-        if missing == 0 || cloud.failed {
+    /// Adds those of `groups` that a node still lacks.
+    fn missing_groups(&self, pick: &Pick, groups: GroupMask, pieces: &mut Vec<Piece>) {
+        let missing = groups & !self.store.groups(pick.id);
+        if missing == 0 || self.clouds[pick.id.cloud].failed {
             return;
         }
         let groups = (0..pick.node.payloads.len()).filter(|&g| missing & group_bit(g) != 0);

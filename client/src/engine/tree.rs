@@ -22,6 +22,7 @@ pub(super) struct Tree {
     commons: Option<Arc<Commons>>,
     nodes: usize,
     walk: u64,
+    is_hidden: bool,
 }
 
 #[derive(Debug)]
@@ -49,7 +50,8 @@ pub(super) enum Children {
 
 impl Tree {
     pub fn new(boot: Arc<Boot>, commons: Option<Arc<Commons>>) -> Self {
-        let mut tree = Self { pages: HashMap::new(), commons, nodes: 0, walk: 0, boot };
+        let pages = HashMap::new();
+        let mut tree = Self { pages, commons, nodes: 0, walk: 0, is_hidden: false, boot };
         let root_page = tree.boot.root_page.clone();
         tree.insert(None, root_page);
         tree
@@ -57,6 +59,11 @@ impl Tree {
 
     pub fn boot(&self) -> &Arc<Boot> {
         &self.boot
+    }
+
+    /// Whether walks find nothing, because the cloud is not to be seen.
+    pub fn hide(&mut self, is_hidden: bool) {
+        self.is_hidden = is_hidden;
     }
 
     /// Adds the page below `parent`.
@@ -76,8 +83,11 @@ impl Tree {
     }
 
     /// Starts a walk from the root; drops pages that the last one did not touch, if there are too
-    /// many nodes. `None` where the cloud has no points.
+    /// many nodes. `None` where the cloud has no points or is hidden.
     pub fn start_walk(&mut self) -> Option<Place> {
+        if self.is_hidden {
+            return None;
+        }
         if self.nodes > MAX_NODES {
             self.drop_untouched_pages();
         }

@@ -3,18 +3,19 @@
 //! The camera moves in simulated time, a new view every step; at instants evenly spread over the path
 //! what is there is compared with the truth from the same place.
 
-use std::{sync::atomic::Ordering, time::Duration};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
 use super::stream::Streaming;
 use crate::{
     camera::Camera,
-    engine::{Policy, SimulatedEngine, View},
+    engine::{Policy, View},
+    interrupt::go_on,
     metrics::{PictureError, Popping},
     path::CameraPath,
     render::Picture,
-    source::{Link, LinkSpec, Source},
+    source::LinkSpec,
 };
 
 /// An instant of a path at which pictures are compared.
@@ -89,16 +90,13 @@ impl Streaming<'_> {
         link: LinkSpec,
         policy: Policy,
     ) -> anyhow::Result<PathRun> {
-        let source = Source::linked(self.subject.file()?, Link::new(link, self.seed));
-        let mut engine = SimulatedEngine::start(vec![source], policy.apply(self.config.clone()))?;
+        let mut engine = self.subject.engine(self.config.clone(), policy, link, self.seed)?;
         let size_px = self.settings.size_px;
         let mut samples = Vec::new();
         let mut pictures: Vec<Picture> = Vec::new();
         for instant in instants {
             loop {
-                if self.cancel.load(Ordering::Relaxed) {
-                    anyhow::bail!("interrupted");
-                }
+                go_on(self.cancel)?;
                 // In whole nanoseconds: of a fraction of one, there is no end.
                 let left = Duration::try_from_secs_f64(instant.seconds)
                     .unwrap_or_default()

@@ -2,21 +2,22 @@
 
 use std::{
     collections::HashMap,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
 use serde::{Deserialize, Serialize};
 
-use super::{curve::pareto, stream::Stop, subject::Subject};
+use super::{
+    curve::pareto,
+    stream::Stop,
+    subject::{Subject, advance},
+};
 use crate::{
-    engine::{EngineConfig, FramePlan, SimulatedEngine, View},
+    engine::{EngineConfig, FramePlan, Policy, View},
     metrics::PictureError,
     render::{CpuRenderer, Picture, RenderSettings, Scene, Splat, SplatSize},
-    source::{Link, LinkSpec, Source},
+    source::LinkSpec,
 };
 
 /// A way to draw a view.
@@ -49,28 +50,18 @@ const AT_ONCE: LinkSpec =
     LinkSpec { bits_per_second: f64::INFINITY, round_trip: Duration::ZERO, loss: 0.0 };
 
 /// What a view shows once all of it is loaded.
-///
-/// # Errors
-/// Where the file cannot be read, or `cancel` is set.
-pub fn settled(
+fn settled(
     subject: &Subject,
     config: EngineConfig,
     view: View,
     cancel: &AtomicBool,
-) -> anyhow::Result<(Arc<FramePlan>, SimulatedEngine)> {
-    let source = Source::linked(subject.file()?, Link::new(AT_ONCE, 0));
-    let mut engine = SimulatedEngine::start(vec![source], config)?;
+) -> anyhow::Result<Arc<FramePlan>> {
+    let mut engine = subject.engine(config, Policy::Ours, AT_ONCE, 0)?;
     engine.set_view(view);
     loop {
-        let plan = engine.advance(Duration::from_millis(100));
-        if let Some(problem) = engine.stats().problems.first() {
-            anyhow::bail!("{problem}");
-        }
-        if cancel.load(Ordering::Relaxed) {
-            anyhow::bail!("interrupted");
-        }
+        let plan = advance(&mut engine, Duration::from_millis(100), cancel)?;
         if plan.settled {
-            return Ok((plan, engine));
+            return Ok(plan);
         }
     }
 }
@@ -96,11 +87,11 @@ pub fn frames(
         let Some(truth) = truths.get(&stop.name) else { continue };
         let first = rows.len();
         for &budget in budgets {
-            let attributes = subject.shown(settings);
+            let attributes = settings.attribute_names(subject.manifest());
             let config =
                 EngineConfig { point_budget: budget, attributes, ..EngineConfig::default() };
             let view = View { camera: stop.camera, size_px: settings.size_px };
-            let (plan, _) = settled(subject, config, view, cancel)?;
+            let plan = settled(subject, config, view, cancel)?;
             let scene = Scene { clouds: &subject.clouds, nodes: &plan.nodes };
             for &(splat, splat_size) in splats {
                 let settings =

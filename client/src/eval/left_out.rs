@@ -11,11 +11,14 @@ use std::{
 use lodestream_protocol::Storage;
 use serde::{Deserialize, Serialize};
 
-use super::{stream::Stop, subject::Subject};
+use super::{
+    stream::Stop,
+    subject::{Subject, advance},
+};
 use crate::{
-    engine::{EngineConfig, LeftOut, SimulatedEngine, View},
+    engine::{EngineConfig, LeftOut, Policy, View},
     render::{CpuRenderer, RenderSettings, Scene, SplatSize},
-    source::{Link, LinkSpec, Source},
+    source::LinkSpec,
 };
 
 /// What a view cost.
@@ -72,7 +75,7 @@ const BEHIND_SIZE: SplatSize = SplatSize::Level(1.6);
 const FRAME: Duration = Duration::from_millis(50);
 
 /// Savings that can be switched off.
-const SAVINGS: [Change; 4] = [
+const SAVINGS: [Change; 5] = [
     (
         "outside the picture",
         |config, _| config.culls_outside = false,
@@ -83,6 +86,7 @@ const SAVINGS: [Change; 4] = [
         |config, _| config.min_size_px = 0.0,
         |left_out| Some([left_out.small.nodes, left_out.small.points]),
     ),
+    ("positions finer than the pixels", |config, _| config.cell_px = 0.0, |_| None),
     (
         "over the point budget",
         |config, _| config.point_budget = u64::MAX,
@@ -170,20 +174,13 @@ fn cost(
     seed: u64,
     cancel: &AtomicBool,
 ) -> anyhow::Result<(Cost, LeftOut)> {
-    let source = Source::linked(subject.file()?, Link::new(link, seed));
     let reach = settings.splat_reach().filter(|_| config.occlusion);
     // The plan whose depths were told last.
     let mut told = None;
-    let mut engine = SimulatedEngine::start(vec![source], config)?;
+    let mut engine = subject.engine(config, Policy::Ours, link, seed)?;
     engine.set_view(View { camera: settings.camera, size_px: settings.size_px });
     let plan = loop {
-        let plan = engine.advance(FRAME);
-        if let Some(problem) = engine.stats().problems.first() {
-            anyhow::bail!("{problem}");
-        }
-        if cancel.load(std::sync::atomic::Ordering::Relaxed) {
-            anyhow::bail!("interrupted");
-        }
+        let plan = advance(&mut engine, FRAME, cancel)?;
         if plan.settled && (reach.is_none() || told == Some(plan.sequence)) {
             break plan;
         }

@@ -101,6 +101,11 @@ pub fn run(
                 subject.name = format!("{} {}", subject.name, build.method);
             }
             subject.name = unique(&subject.name, opened.iter().map(|(other, _)| &*other.name));
+            if config.policies.iter().any(|policy| *policy != Policy::Ours) {
+                let folder = tempfile::tempdir_in(scratch.path());
+                subject
+                    .prepare_rivals(&folder.context("cannot make a temporary folder")?.keep())?;
+            }
             opened.push((subject, build));
         }
     }
@@ -282,7 +287,7 @@ fn evaluate(
         settings: base,
         config: EngineConfig {
             point_budget: config.stream_budget,
-            attributes: subject.shown(&base),
+            attributes: base.attribute_names(subject.manifest()),
             ..EngineConfig::default()
         },
         step: Duration::from_millis(50),

@@ -5,10 +5,7 @@
 
 use std::{
     collections::HashMap,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic::AtomicBool},
     time::Duration,
 };
 
@@ -21,9 +18,10 @@ use super::{
 use crate::{
     camera::Camera,
     engine::{EngineConfig, FramePlan, Policy, SimulatedEngine, View},
+    interrupt::go_on,
     metrics::PictureError,
     render::{Picture, RenderSettings, TruthRenderer, VisibleTree},
-    source::{Link, LinkSpec, Source},
+    source::LinkSpec,
 };
 
 /// Levels of similarity whose times are told.
@@ -113,9 +111,7 @@ impl Streaming<'_> {
         link: LinkSpec,
         policy: Policy,
     ) -> anyhow::Result<Vec<StreamRun>> {
-        let source = Source::linked(self.subject.file()?, Link::new(link, self.seed));
-        let config = policy.apply(self.config.clone());
-        let mut engine = SimulatedEngine::start(vec![source], config)?;
+        let mut engine = self.subject.engine(self.config.clone(), policy, link, self.seed)?;
         let mut from = "cold".to_owned();
         let mut runs = Vec::new();
         for stop in stops {
@@ -148,9 +144,7 @@ impl Streaming<'_> {
         // At time 0 too: what is there from before counts.
         let mut step = Duration::ZERO;
         loop {
-            if self.cancel.load(Ordering::Relaxed) {
-                anyhow::bail!("interrupted");
-            }
+            go_on(self.cancel)?;
             // To the timer's step, so that what comes after the end is told apart.
             let due = engine.time() + step;
             plan = engine.advance(Duration::ZERO);

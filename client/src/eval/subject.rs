@@ -2,26 +2,22 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic::AtomicBool},
+    time::Duration,
 };
 
 use anyhow::Context;
 use glam::DVec3;
-use lodestream_preprocess::FileSource as PositionedFile;
-use lodestream_protocol::{Dataset, Manifest, Node, Refinement};
-use rayon::prelude::*;
+use lodestream_preprocess::{FileSource as PositionedFile, with_whole_positions};
+use lodestream_protocol::{Dataset, Manifest, Node};
 
 use crate::{
-    engine::DrawNode,
+    engine::{EngineConfig, FramePlan, Policy, SimulatedEngine},
+    full_resolution,
+    interrupt::go_on,
     render::{Picture, RenderSettings, TruthRenderer, VisibleTree},
-    source::FileSource,
+    source::{FileSource, Link, LinkSpec, Source},
 };
-
-/// Points that are decoded at a time for a truth.
-const BATCH_POINTS: u64 = 1 << 20;
 
 /// An open dataset.
 pub struct Subject {
@@ -35,6 +31,8 @@ pub struct Subject {
     pub bounds: [DVec3; 2],
     /// Where its points have their middle.
     pub middle: DVec3,
+    /// The same points with positions in one part, where the file has them in two.
+    whole: Option<PathBuf>,
     dataset: Dataset<PositionedFile>,
     /// The nodes that hold every point once.
     nodes: Vec<Node>,
@@ -49,7 +47,7 @@ impl Subject {
         let context = || path.display().to_string();
         let dataset = Dataset::open(PositionedFile::open(path)?).with_context(context)?;
         let manifest = Arc::new(dataset.manifest().clone());
-        let mut nodes = dataset.hierarchy().with_context(context)?;
+        let nodes = dataset.hierarchy().with_context(context)?;
         let Some((bounds, root)) = manifest.bounds_world().zip(nodes.first()) else {
             anyhow::bail!("{}: has no points, so that there is nothing to evaluate", context());
         };
@@ -63,13 +61,11 @@ impl Subject {
             corner[axis].saturating_add(along.get(count as usize / 2).copied().unwrap_or(0))
         });
         let middle = manifest.lattice.world(middle).into();
-        if manifest.refinement == Refinement::Replace {
-            nodes.retain(Node::is_leaf);
-        }
-        nodes.sort_by_key(|node| node.key);
+        let nodes = full_resolution::nodes(manifest.refinement, nodes);
         let name = path.file_stem().map(|name| name.to_string_lossy().into_owned());
         Ok(Self {
             name: name.unwrap_or_default(),
+            whole: None,
             path: path.to_owned(),
             clouds: vec![manifest],
             bounds: [bounds.0.into(), bounds.1.into()],
@@ -85,20 +81,38 @@ impl Subject {
         &self.clouds[0]
     }
 
-    /// The names of the attributes that pictures of such settings show.
-    #[must_use]
-    pub fn shown(&self, settings: &RenderSettings) -> Vec<String> {
-        let manifest = self.manifest();
-        let shown = settings.attributes(manifest).into_iter();
-        shown.map(|index| manifest.attributes[index].name.clone()).collect()
-    }
-
-    /// The file, to be put behind a link.
+    /// Prepares for the rivals' policies: they know no positions in two parts, and fetch of every node a
+    /// range that holds all of it. So they fetch from a twin, which is written to `folder`.
     ///
     /// # Errors
-    /// Where it cannot be opened any more.
-    pub fn file(&self) -> anyhow::Result<FileSource> {
-        Ok(FileSource::open(&self.path)?)
+    /// Where the twin cannot be written.
+    pub fn prepare_rivals(&mut self, folder: &Path) -> anyhow::Result<()> {
+        if self.manifest().fine.is_some() {
+            let path = folder.join(format!("{}.lods", self.name));
+            with_whole_positions(&self.dataset, &path)?;
+            self.whole = Some(path);
+        }
+        Ok(())
+    }
+
+    /// An engine that fetches the dataset by such a link and policy, in simulated time.
+    ///
+    /// # Errors
+    /// Where the file cannot be opened any more.
+    pub fn engine(
+        &self,
+        config: EngineConfig,
+        policy: Policy,
+        link: LinkSpec,
+        seed: u64,
+    ) -> anyhow::Result<SimulatedEngine> {
+        let path = match (policy, &self.whole) {
+            (Policy::Potree | Policy::Fraiss, Some(whole)) => whole,
+            _ => &self.path,
+        };
+        let config = policy.apply(config);
+        let source = Source::linked(FileSource::open(path)?, Link::new(link, seed));
+        Ok(SimulatedEngine::start(vec![source], config)?)
     }
 
     /// The nodes that hold every point once.
@@ -126,34 +140,31 @@ impl Subject {
             if pass > 0 {
                 renderer.next_pass()?;
             }
-            let mut rest = self.nodes.as_slice();
-            while !rest.is_empty() {
-                if cancel.load(Ordering::Relaxed) {
-                    anyhow::bail!("interrupted");
-                }
-                let mut points = 0;
-                let fits = |node: &&Node| {
-                    points += u64::from(node.points);
-                    points <= BATCH_POINTS
-                };
-                // One node at least, however large.
-                let count = rest.iter().take_while(fits).count().max(1);
-                let (batch, next) = rest.split_at(count);
-                rest = next;
-                let read = |node: &Node| self.dataset.read_node(node, &groups);
-                let decoded = batch.par_iter().map(read).collect::<Result<Vec<_>, _>>();
-                let decoded = decoded.with_context(|| self.path.display().to_string())?;
-                for (node, points) in batch.iter().zip(decoded) {
-                    let (key, spacing) = (node.key, node.spacing);
-                    renderer.add_node(DrawNode {
-                        cloud: 0,
-                        key,
-                        spacing,
-                        points: Arc::new(points),
-                    })?;
-                }
+            let done = |_| go_on(cancel);
+            let drawn =
+                full_resolution::draw(&mut renderer, 0, &self.dataset, &self.nodes, &groups, done);
+            if let Err(error) = drawn {
+                go_on(cancel)?;
+                return Err(error.context(self.path.display().to_string()));
             }
         }
         Ok(renderer.finish()?.picture)
+    }
+}
+
+/// Lets so much time pass.
+///
+/// # Errors
+/// Where something has failed for good, or `cancel` is set.
+pub(super) fn advance(
+    engine: &mut SimulatedEngine,
+    time: Duration,
+    cancel: &AtomicBool,
+) -> anyhow::Result<Arc<FramePlan>> {
+    go_on(cancel)?;
+    let plan = engine.advance(time);
+    match engine.stats().problems.first() {
+        Some(problem) => anyhow::bail!("{problem}"),
+        None => Ok(plan),
     }
 }

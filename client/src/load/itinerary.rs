@@ -58,7 +58,7 @@ impl Itinerary {
 
     /// Views of one round.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub fn views(&self) -> usize {
         self.stops.len()
     }
 
@@ -107,9 +107,9 @@ mod tests {
     #[test]
     fn a_camera_that_moves_is_seen_at_the_rate_and_one_that_rests_once() {
         let orbit = itinerary("orbit?seconds=4", 5.0);
-        assert_eq!((orbit.len(), orbit.jumps(), orbit.duration().as_secs()), (20, 0, 4));
+        assert_eq!((orbit.views(), orbit.jumps(), orbit.duration().as_secs()), (20, 0, 4));
         let teleport = itinerary("teleport?seconds=10&stops=4", 7.0);
-        assert_eq!((teleport.len(), teleport.jumps()), (4, 3));
+        assert_eq!((teleport.views(), teleport.jumps()), (4, 3));
         let times: Vec<_> = teleport.round(0).map(|stop| stop.at.as_secs_f64()).collect();
         assert_eq!(times, [0.0, 2.5, 5.0, 7.5], "at the jumps, not at the next tick");
     }
@@ -119,7 +119,7 @@ mod tests {
         let itinerary = itinerary("teleport?seconds=10&stops=5", 3.0);
         for first in 0..12 {
             let round: Vec<_> = itinerary.round(first).collect();
-            assert_eq!(round.len(), itinerary.len());
+            assert_eq!(round.len(), itinerary.views());
             assert!(round[0].at.is_zero());
             assert!(round.windows(2).all(|pair| pair[0].at < pair[1].at));
             assert!(round[round.len() - 1].at < itinerary.duration());
@@ -131,7 +131,7 @@ mod tests {
     fn clients_begin_all_over_the_path() {
         let itinerary = itinerary("orbit?seconds=10", 10.0);
         let mut quarters = [0; 4];
-        (0..100).for_each(|client| quarters[itinerary.offset(client) * 4 / itinerary.len()] += 1);
+        (0..100).for_each(|client| quarters[itinerary.offset(client) * 4 / itinerary.views()] += 1);
         assert!(quarters.iter().all(|&count| (20..=30).contains(&count)), "{quarters:?}");
     }
 }

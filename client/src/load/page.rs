@@ -15,8 +15,9 @@ use crate::{
 #[must_use]
 pub fn page(report: &LoadReport) -> Page {
     let mut sections = vec![answer(report), waits(report)];
-    if report.runs.len() > 1 {
-        sections.push(growth(report));
+    let policies = policies_with_many(report);
+    if !policies.is_empty() {
+        sections.push(growth(report, &policies));
     }
     if !report.ratios.is_empty() {
         sections.push(beside(report));
@@ -84,7 +85,7 @@ fn tiles(report: &LoadReport) -> Vec<(String, String, Tone)> {
         (time(run.cold.first.p50_ms), "to the first picture (median)".into(), Tone::Plain),
         (time(run.cold.settled.p50_ms), "until all is there (median)".into(), Tone::Plain),
         (
-            format!("{:.0} MB/s", run.bytes.per_second / 1e6),
+            format!("{} MB/s", short(run.bytes.per_second / 1e6)),
             "received by all clients".into(),
             Tone::Plain,
         ),
@@ -226,12 +227,14 @@ fn waits(report: &LoadReport) -> Section {
     }
 }
 
+/// Policies that were run with several numbers of clients.
+fn policies_with_many(report: &LoadReport) -> Vec<Policy> {
+    let of = |policy: &Policy| report.runs.iter().filter(|run| run.policy == *policy).count();
+    Policy::ALL.into_iter().filter(|policy| of(policy) > 1).collect()
+}
+
 /// What becomes of the figures as clients become more.
-fn growth(report: &LoadReport) -> Section {
-    let policies = Policy::ALL
-        .into_iter()
-        .filter(|policy| report.runs.iter().filter(|run| run.policy == *policy).count() > 1);
-    let policies: Vec<_> = policies.collect();
+fn growth(report: &LoadReport, policies: &[Policy]) -> Section {
     let plot = |title: &str, y: &str, value: &dyn Fn(&RunReport) -> Option<f64>| Plot {
         title: title.into(),
         x: "clients".into(),
@@ -268,14 +271,13 @@ fn growth(report: &LoadReport) -> Section {
     Section {
         anchor: "growth".into(),
         title: "More clients".into(),
-        lead: if policies.is_empty() { String::new() } else { lead.into() },
+        lead: lead.into(),
         body: html! {
-            @if policies.is_empty() { p { "Each policy was run with one number of clients." } }
-            @else { div.plots {
+            div.plots {
                 @for plot in plots.iter().filter(|p| p.series.iter().any(|s| !s.points.is_empty())) {
                     (plot.markup())
                 }
-            } }
+            }
         },
     }
 }
@@ -455,4 +457,10 @@ fn color(policy: Policy) -> usize {
 
 fn thousands(number: u64) -> String {
     indicatif::HumanCount(number).to_string()
+}
+
+/// Three digits of it.
+fn short(value: f64) -> String {
+    let digits = if value < 10.0 { 2 } else { usize::from(value < 100.0) };
+    format!("{value:.digits$}")
 }

@@ -55,6 +55,8 @@ pub struct LoadReport {
     pub ramp_seconds: f64,
     /// Whether clients keep what they have from one round to the next.
     pub keeps: bool,
+    /// Whether ours asks for many parts with one request, where the host takes such.
+    pub batches: bool,
     /// Run by run, as they were made.
     pub runs: Vec<RunReport>,
     /// Where more clients bring less, for each policy that was run with three numbers of them or more.

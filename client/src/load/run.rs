@@ -58,6 +58,7 @@ pub fn run(
         views_per_second: config.views_per_second,
         ramp_seconds: config.ramp.as_secs_f64(),
         keeps: config.keeps,
+        batches: config.engine.batches,
         runs: Vec::new(),
         knees: Vec::new(),
         ratios: Vec::new(),

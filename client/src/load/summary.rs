@@ -184,8 +184,8 @@ mod tests {
     #[test]
     fn times_are_told_in_units_that_fit() {
         assert_eq!(
-            [None, Some(3.14), Some(314.0), Some(3140.0)].map(time),
-            ["-", "3.1 ms", "314 ms", "3.14 s"]
+            [None, Some(3.21), Some(321.0), Some(3210.0)].map(time),
+            ["-", "3.2 ms", "321 ms", "3.21 s"]
         );
     }
 

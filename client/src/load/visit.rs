@@ -1,9 +1,6 @@
 //! A visitor: a real engine that follows the timetable, and a record of what came of it when.
 
-use std::{
-    collections::{HashMap, HashSet},
-    time::Duration,
-};
+use std::{collections::HashMap, time::Duration};
 
 use lodestream_protocol::NodeKey;
 use tokio::{
@@ -120,8 +117,8 @@ struct Log<'a> {
     /// Wanted nodes that are not there: since when, and the last plan that wanted them.
     missing: HashMap<Id, (Instant, u64)>,
     plans: u64,
-    used: HashSet<Id>,
-    used_bytes: u64,
+    /// Bytes of nodes that were drawn.
+    used: HashMap<Id, u64>,
     waits: Vec<NodeWait>,
     picture: Option<Picture>,
 }
@@ -148,8 +145,7 @@ impl<'a> Log<'a> {
             index_since: Some(begin),
             missing: HashMap::new(),
             plans: 0,
-            used: HashSet::new(),
-            used_bytes: 0,
+            used: HashMap::new(),
             waits: Vec::new(),
             picture: None,
         }
@@ -215,9 +211,9 @@ impl<'a> Log<'a> {
         if let Some((due, _)) = self.missing.remove(&id) {
             self.waits.push(NodeWait { due, end: now, came: true });
         }
-        if self.used.insert(id) {
-            self.used_bytes += node.bytes;
-        }
+        // More where it is drawn more exactly than before.
+        let used = self.used.entry(id).or_default();
+        *used = node.bytes.max(*used);
     }
 
     fn note_picture(&mut self, engine: &TaskedEngine, plan: &FramePlan, now: Instant) {
@@ -259,7 +255,8 @@ impl<'a> Log<'a> {
             let boots = clouds.iter().filter_map(|cloud| cloud.boot.as_ref());
             boots.map(|boot| boot.header.index_bytes()).sum::<u64>()
         });
-        let used = (self.used_bytes + index + totals.page_bytes).min(totals.bytes);
+        let drawn: u64 = self.used.values().sum();
+        let used = (drawn + index + totals.page_bytes).min(totals.bytes);
         self.ledger.add(|entries| {
             entries.add_totals(totals);
             entries.used_bytes += used;

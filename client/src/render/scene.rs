@@ -20,7 +20,8 @@ fn order(node: &DrawNode) -> (usize, NodeKey) {
 /// What is drawn.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
-    /// The clouds: all that the nodes belong to. The renderer that keeps nodes from frame to frame
+    /// The clouds: all that the nodes belong to, as [`FramePlan::clouds`](crate::engine::FramePlan::clouds)
+    /// has them. The renderer that keeps nodes from frame to frame
     /// knows a cloud again by its `Arc`, and a node by its key.
     pub clouds: &'a [Arc<Manifest>],
     /// The nodes, in any order, each once, [`DrawNode::cloud`] counting from the first cloud here.

@@ -25,6 +25,7 @@ pub fn manifest() -> Manifest {
         largest_rounding: 0.0,
         attributes: Vec::new(),
         groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
+        fine: None,
         crs: None,
         sources: Vec::new(),
     }
@@ -125,6 +126,7 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
         let intensities = points.iter().flat_map(|p| p.intensity.to_le_bytes());
         let node = NodePoints {
             key,
+            cell_bits: 0,
             positions: points.iter().map(relative).collect(),
             columns: vec![
                 Column { attribute: 0, bytes: colors.collect() },

@@ -15,6 +15,13 @@ pub enum SourceError {
         /// Its kind.
         fault: Fault,
     },
+    /// The file is no longer the one that was opened: nothing more of that one can be had.
+    /// [`Source::renew`](super::Source::renew) makes a source of the one that is there now.
+    #[error("{place}: the file was replaced while it was in use; open it again")]
+    Replaced {
+        /// The source, as [`Source::describe`](super::Source::describe) names it.
+        place: String,
+    },
     /// Trying again cannot help; the message says what would.
     #[error("{place}: {message}")]
     Permanent {
@@ -39,6 +46,7 @@ impl SourceError {
     pub const fn fault(&self) -> Fault {
         match self {
             Self::Transient { fault, .. } | Self::Permanent { fault, .. } => *fault,
+            Self::Replaced { .. } => Fault::Replaced,
         }
     }
 
@@ -54,6 +62,7 @@ impl SourceError {
     pub(super) fn of(mut self, kind: Fault) -> Self {
         match &mut self {
             Self::Transient { fault, .. } | Self::Permanent { fault, .. } => *fault = kind,
+            Self::Replaced { .. } => {}
         }
         self
     }

@@ -1,16 +1,19 @@
 //! A local file, read at positions by blocking threads.
 //!
-//! Not memory-mapped: a file that is cut short under a map kills the process.
+//! Not memory-mapped: a file that is cut short under a map kills the process. After every read it is
+//! looked whether the path still names the file that was opened, as it was: bytes of two versions are
+//! never taken for one file's.
 
 use std::{
-    fs::File,
+    fs::{File, Metadata},
     path::{Path, PathBuf},
     sync::Arc,
+    time::SystemTime,
 };
 
 use bytes::Bytes;
 
-use super::{Announced, SourceError};
+use super::SourceError;
 
 /// A local dataset file. Clones share the open file.
 #[derive(Debug, Clone)]
@@ -23,6 +26,16 @@ struct OpenFile {
     path: PathBuf,
     file: File,
     len: u64,
+    identity: Identity,
+}
+
+/// What tells one version of a file from another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Identity {
+    len: u64,
+    modified: Option<SystemTime>,
+    /// Device and number, where the system has them.
+    number: Option<(u64, u64)>,
 }
 
 impl FileSource {
@@ -38,7 +51,13 @@ impl FileSource {
         if !metadata.is_file() {
             return Err(fail("is no file; name a .lods dataset".into()));
         }
-        Ok(Self { inner: Arc::new(OpenFile { path, file, len: metadata.len() }) })
+        let identity = Identity::of(&metadata);
+        Ok(Self { inner: Arc::new(OpenFile { path, file, len: metadata.len(), identity }) })
+    }
+
+    /// Opens what lies at the path now.
+    pub(super) fn renew(&self) -> Result<Self, SourceError> {
+        Self::open(&self.inner.path)
     }
 
     /// The path.
@@ -73,17 +92,6 @@ impl FileSource {
         Ok(())
     }
 
-    pub(super) async fn stream_prefix(
-        &self,
-        len: u64,
-        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
-    ) -> Result<(), SourceError> {
-        let total = self.inner.len;
-        let bytes = self.read(0, len.min(total)).await?;
-        sink(bytes, Announced { len: len.min(total), total: Some(total) });
-        Ok(())
-    }
-
     /// Reads on this thread.
     pub(super) fn read_now(&self, offset: u64, len: u64) -> Result<Bytes, SourceError> {
         self.inner.read(offset, len)
@@ -97,8 +105,24 @@ impl FileSource {
     }
 }
 
+impl Identity {
+    fn of(metadata: &Metadata) -> Self {
+        Self { len: metadata.len(), modified: metadata.modified().ok(), number: number(metadata) }
+    }
+}
+
 impl OpenFile {
     fn read(&self, offset: u64, len: u64) -> Result<Bytes, SourceError> {
+        let bytes = self.read_open(offset, len);
+        // A file that was deleted can still be read.
+        let now = std::fs::metadata(&self.path).map(|metadata| Identity::of(&metadata));
+        if now.is_ok_and(|now| now != self.identity) {
+            return Err(SourceError::Replaced { place: self.path.display().to_string() });
+        }
+        bytes
+    }
+
+    fn read_open(&self, offset: u64, len: u64) -> Result<Bytes, SourceError> {
         let permanent =
             |message: String| SourceError::permanent(self.path.display().to_string(), message);
         // Against the length on opening, so that nothing is allocated for bytes that are not there.
@@ -123,6 +147,17 @@ impl OpenFile {
             )),
         }
     }
+}
+
+#[cfg(unix)]
+fn number(metadata: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((metadata.dev(), metadata.ino()))
+}
+
+#[cfg(windows)]
+fn number(_metadata: &Metadata) -> Option<(u64, u64)> {
+    None
 }
 
 #[cfg(unix)]

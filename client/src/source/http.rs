@@ -5,35 +5,26 @@
 //! whole files again and again; its 200 is recognised from the head and the connection is closed
 //! without the body.
 
-use std::{
-    sync::{Arc, OnceLock},
-    time::Duration,
+use std::sync::{
+    Arc, OnceLock,
+    atomic::{AtomicBool, Ordering},
 };
 
 use bytes::Bytes;
+use lodestream_protocol::{
+    BATCH_REQUEST_TYPE, BATCH_TYPE, BatchDecoder, BatchPart, BatchRequest, MAX_BATCH_BYTES,
+    MAX_BATCH_PARTS,
+};
 use reqwest::{
-    Client, Response, StatusCode, Url,
+    Response, StatusCode, Url,
     header::{self, HeaderMap},
 };
 
-use super::{Announced, Fault, SourceError, Wire, wire::Trip};
-
-/// How long a host may be silent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Timeouts {
-    /// Until a connection stands.
-    pub connect: Duration,
-    /// Until the head of an answer or the next part of its body arrives. There is no limit for a
-    /// whole answer: a slow link is no failure.
-    pub silence: Duration,
-}
-
-impl Default for Timeouts {
-    /// 10 s to connect, 15 s of silence.
-    fn default() -> Self {
-        Self { connect: Duration::from_secs(10), silence: Duration::from_secs(15) }
-    }
-}
+use super::{
+    Announced, BatchLimits, Fault, SourceError, Wire,
+    connector::{Connections, Connector, Timeouts},
+    wire::Trip,
+};
 
 /// A dataset file at a URL. Clones share connections.
 #[derive(Debug, Clone)]
@@ -43,19 +34,32 @@ pub struct HttpSource {
 
 #[derive(Debug)]
 struct Inner {
-    client: Client,
+    connector: Arc<Connector>,
     url: Url,
     /// The URL without what may be secret.
     place: String,
     wire: Wire,
     /// Set by the first good answer.
     identity: OnceLock<Identity>,
+    /// What the host offers, set by the first answer that tells.
+    batches: OnceLock<Offer>,
+    /// Something between here and the host lets no batches through.
+    takes_no_batches: AtomicBool,
+}
+
+/// A host's offer to take requests for many parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Offer {
+    content_id: [u8; 16],
+    limits: BatchLimits,
 }
 
 /// What tells one version of a file from another.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Identity {
     etag: Option<String>,
+    /// `Last-Modified`, for hosts that have no entity tags.
+    modified: Option<String>,
     total: Option<u64>,
 }
 
@@ -78,46 +82,45 @@ struct ContentRange {
 
 impl HttpSource {
     /// A source at `url` with the default [`Timeouts`]. Nothing is asked yet.
-    ///
-    /// # Errors
-    /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
-    pub fn new(url: Url) -> Result<Self, SourceError> {
+    #[must_use]
+    pub fn new(url: Url) -> Self {
         Self::with_timeouts(url, Timeouts::default())
     }
 
     /// A source at `url`. Nothing is asked yet.
-    ///
-    /// # Errors
-    /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
-    pub fn with_timeouts(url: Url, timeouts: Timeouts) -> Result<Self, SourceError> {
+    #[must_use]
+    pub fn with_timeouts(url: Url, timeouts: Timeouts) -> Self {
         Self::by_wire(url, timeouts, Wire::default())
     }
 
     /// A source at `url` whose requests go through `wire`. Nothing is asked yet.
-    ///
-    /// # Errors
-    /// [`SourceError::Permanent`] where the system cannot provide an HTTP client.
-    pub fn by_wire(url: Url, timeouts: Timeouts, wire: Wire) -> Result<Self, SourceError> {
-        // An error means that the process has chosen its provider already: just as good.
-        let _ = rustls::crypto::ring::default_provider().install_default();
+    #[must_use]
+    pub fn by_wire(url: Url, timeouts: Timeouts, wire: Wire) -> Self {
+        let connector = Connector::new(timeouts, &url);
+        // There may be thousands that are measured, and each of them a client of its own.
+        let needs_none = wire.meter.is_some() && url.scheme() == "http";
+        let connector = if needs_none { connector.without_certificates() } else { connector };
+        Self::through(Arc::new(connector), url, wire)
+    }
+
+    fn through(connector: Arc<Connector>, url: Url, wire: Wire) -> Self {
         let place = without_secrets(&url);
-        let mut builder = Client::builder()
-            .user_agent(concat!("lodestream/", env!("CARGO_PKG_VERSION")))
-            .tcp_nodelay(true)
-            .connect_timeout(timeouts.connect)
-            .read_timeout(timeouts.silence);
-        if is_local(&url) {
-            builder = builder.no_proxy();
-        }
-        if wire.meter.is_some() && url.scheme() == "http" {
-            // Reading the system's certificates takes 6 ms of processor time: more than all else a
-            // client does until its first picture, and there may be thousands.
-            builder = builder.tls_certs_only([]);
-        }
-        let client = builder
-            .build()
-            .map_err(|e| SourceError::permanent(&place, format!("no HTTP client: {e}")))?;
-        Ok(Self { inner: Arc::new(Inner { client, url, place, wire, identity: OnceLock::new() }) })
+        let (identity, batches) = (OnceLock::new(), OnceLock::new());
+        let takes_no_batches = AtomicBool::new(false);
+        let inner = Inner { connector, url, place, wire, identity, batches, takes_no_batches };
+        Self { inner: Arc::new(inner) }
+    }
+
+    /// A source of whatever lies at the URL now. Shares connections.
+    pub(super) fn renew(&self) -> Self {
+        let Inner { connector, url, wire, .. } = &*self.inner;
+        Self::through(Arc::clone(connector), url.clone(), wire.clone())
+    }
+
+    /// The source, sharing connections with others.
+    pub(super) fn sharing(&self, connections: &Connections) -> Self {
+        let Inner { connector, url, wire, .. } = &*self.inner;
+        Self::through(connections.shared(connector), url.clone(), wire.clone())
     }
 
     /// The URL, with whatever secrets it holds.
@@ -154,9 +157,7 @@ impl HttpSource {
         ask: Ask,
         sink: &mut (dyn FnMut(Bytes, Announced) + Send),
     ) -> Result<(), SourceError> {
-        let Some(mut trip) = self.inner.wire.depart(ask.offset).await else {
-            return Err(self.permanent("no more requests may be sent"));
-        };
+        let mut trip = self.depart(ask.offset).await?;
         let outcome = match self.ask(ask).await {
             Ok((response, range)) => {
                 trip.answered().await;
@@ -165,8 +166,113 @@ impl HttpSource {
             }
             Err(error) => Err(error),
         };
-        trip.end(outcome.as_ref().map(|()| ()).map_err(SourceError::fault));
+        trip.end(outcome.as_ref().err().map(SourceError::fault));
         outcome
+    }
+
+    pub(super) fn batch_limits(&self) -> Option<BatchLimits> {
+        let is_barred = self.inner.takes_no_batches.load(Ordering::Relaxed);
+        self.inner.batches.get().filter(|_| !is_barred).map(|offer| offer.limits)
+    }
+
+    /// Without an offer, or where what lies between bars batches after all, the parts come one by one.
+    pub(super) async fn stream_parts(
+        &self,
+        parts: &[BatchPart],
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<(), SourceError> {
+        let offer = self.inner.batches.get().filter(|_| self.batch_limits().is_some());
+        if let Some(offer) = offer {
+            let request = BatchRequest { content_id: offer.content_id, parts: parts.to_vec() };
+            let start = parts.first().map_or(0, |part| part.offset);
+            let mut trip = self.depart(start).await?;
+            let outcome = self.transfer_batch(request, &mut trip, sink).await;
+            trip.end(outcome.as_ref().err().map(SourceError::fault));
+            if outcome? {
+                return Ok(());
+            }
+            self.inner.takes_no_batches.store(true, Ordering::Relaxed);
+        }
+        for part in parts {
+            self.stream_range(part.offset, u64::from(part.bytes), sink).await?;
+        }
+        Ok(())
+    }
+
+    /// Sends the request and hands on its answer, by the wire; `false` where it is not of a host that takes
+    /// batches.
+    async fn transfer_batch(
+        &self,
+        request: BatchRequest,
+        trip: &mut Trip<'_>,
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<bool, SourceError> {
+        let Some(response) = self.ask_for_batch(&request).await? else { return Ok(false) };
+        trip.answered().await;
+        self.read_batch(response, request, trip, sink).await?;
+        Ok(true)
+    }
+
+    /// Lets a request for bytes from `offset` go.
+    async fn depart(&self, offset: u64) -> Result<Trip<'_>, SourceError> {
+        let trip = self.inner.wire.depart(offset).await;
+        trip.ok_or_else(|| self.permanent("no more requests may be sent"))
+    }
+
+    /// `None` where the answer is not of a host that takes batches.
+    async fn ask_for_batch(&self, request: &BatchRequest) -> Result<Option<Response>, SourceError> {
+        let body = request.encode().map_err(|e| self.permanent(e.to_string()))?;
+        let mut url = self.inner.url.clone();
+        url.set_path(&format!("{}/batch", url.path()));
+        let client = self.inner.connector.client().map_err(|why| self.permanent(why))?;
+        let post = client.post(url).header(header::CONTENT_TYPE, BATCH_REQUEST_TYPE);
+        let response = post.body(body).send().await.map_err(|e| self.classify(&e))?;
+        let status = response.status();
+        match status {
+            StatusCode::OK => {
+                let content_type = response.headers().get(header::CONTENT_TYPE);
+                return Ok(content_type.is_some_and(|t| t == BATCH_TYPE).then_some(response));
+            }
+            StatusCode::PRECONDITION_FAILED => return Err(self.changed()),
+            StatusCode::RANGE_NOT_SATISFIABLE => {
+                let message = "a part is beyond the end of the file: cut short";
+                return Err(self.permanent(message).of(Fault::Status(status.as_u16())));
+            }
+            StatusCode::REQUEST_TIMEOUT | StatusCode::TOO_EARLY | StatusCode::TOO_MANY_REQUESTS => {
+            }
+            StatusCode::NOT_IMPLEMENTED => return Ok(None),
+            _ if status.is_server_error() => {}
+            _ => return Ok(None),
+        }
+        let error = self.transient(format!("the host answered {status}"));
+        Err(error.of(Fault::Status(status.as_u16())))
+    }
+
+    async fn read_batch(
+        &self,
+        mut response: Response,
+        request: BatchRequest,
+        trip: &mut Trip<'_>,
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<(), SourceError> {
+        let mut decoder = BatchDecoder::new(request);
+        while let Some(mut piece) = response.chunk().await.map_err(|e| self.classify(&e))? {
+            trip.received(piece.len() as u64).await;
+            while !piece.is_empty() {
+                let step = decoder
+                    .step(&piece)
+                    .map_err(|e| self.transient(e.to_string()).of(Fault::WrongRange))?;
+                let bytes = piece.split_to(step.bytes);
+                if step.is_payload {
+                    sink(bytes);
+                }
+            }
+        }
+        if decoder.is_complete() {
+            Ok(())
+        } else {
+            Err(self.transient("the answer broke off").of(Fault::BrokenOff))
+        }
     }
 
     pub(super) async fn size(&self) -> Result<u64, SourceError> {
@@ -182,9 +288,8 @@ impl HttpSource {
         let Some(last) = ask.len.checked_sub(1).and_then(|n| ask.offset.checked_add(n)) else {
             return Err(self.permanent(format!("{} bytes at {} are no range", ask.len, ask.offset)));
         };
-        let response = self
-            .inner
-            .client
+        let client = self.inner.connector.client().map_err(|why| self.permanent(why))?;
+        let response = client
             .get(self.inner.url.clone())
             .header(header::RANGE, format!("bytes={}-{last}", ask.offset))
             .send()
@@ -264,10 +369,13 @@ impl HttpSource {
     }
 
     fn check_identity(&self, headers: &HeaderMap, total: Option<u64>) -> Result<(), SourceError> {
-        let found = Identity { etag: etag(headers), total };
+        let found = Identity::of(headers, total);
         let first = self.inner.identity.get_or_init(|| found.clone());
         if first.differs_from(&found) {
             return Err(self.changed());
+        }
+        if let Some(offer) = Offer::read(headers) {
+            self.inner.batches.get_or_init(|| offer);
         }
         Ok(())
     }
@@ -277,7 +385,7 @@ impl HttpSource {
         let status = response.status();
         let error = match status {
             StatusCode::OK => {
-                let found = Identity { etag: etag(response.headers()), total: None };
+                let found = Identity::of(response.headers(), None);
                 return match self.inner.identity.get() {
                     Some(first) if first.differs_from(&found) => self.changed(),
                     // It can answer ranges: this was a bad moment, or a proxy's error page.
@@ -329,8 +437,7 @@ impl HttpSource {
     }
 
     fn changed(&self) -> SourceError {
-        let message = "the file was replaced while it was in use; open it again";
-        self.permanent(message).of(Fault::Replaced)
+        SourceError::Replaced { place: self.inner.place.clone() }
     }
 
     fn transient(&self, message: impl Into<String>) -> SourceError {
@@ -343,11 +450,48 @@ impl HttpSource {
 }
 
 impl Identity {
+    fn of(headers: &HeaderMap, total: Option<u64>) -> Self {
+        let text = |name| Some(headers.get(name)?.to_str().ok()?.to_owned());
+        Self { etag: text(header::ETAG), modified: text(header::LAST_MODIFIED), total }
+    }
+
     /// Whether both tell, and tell different things.
     fn differs_from(&self, other: &Self) -> bool {
-        let etags = self.etag.as_ref().zip(other.etag.as_ref());
         let totals = self.total.zip(other.total);
-        etags.is_some_and(|(a, b)| a != b) || totals.is_some_and(|(a, b)| a != b)
+        // Where there are tags, they decide: copies of a file on several hosts have several dates.
+        let names = match self.etag.as_ref().zip(other.etag.as_ref()) {
+            Some(etags) => Some(etags),
+            None => self.modified.as_ref().zip(other.modified.as_ref()),
+        };
+        names.is_some_and(|(a, b)| a != b) || totals.is_some_and(|(a, b)| a != b)
+    }
+}
+
+impl Offer {
+    /// `lodestream-batch: 1; parts=COUNT; bytes=COUNT`, beside an entity tag that is the content's
+    /// identity.
+    fn read(headers: &HeaderMap) -> Option<Self> {
+        let offer = headers.get("lodestream-batch")?.to_str().ok()?;
+        let mut fields = offer.split(';').map(str::trim);
+        if fields.next()? != "1" {
+            return None;
+        }
+        let mut limits = BatchLimits { parts: 1, bytes: 0 };
+        for (name, value) in fields.filter_map(|field| field.split_once('=')) {
+            match name {
+                "parts" => limits.parts = value.parse().ok()?,
+                "bytes" => limits.bytes = value.parse().ok()?,
+                _ => {}
+            }
+        }
+        let limits = BatchLimits {
+            parts: limits.parts.min(MAX_BATCH_PARTS),
+            bytes: limits.bytes.min(MAX_BATCH_BYTES),
+        };
+        let etag = headers.get(header::ETAG)?.to_str().ok()?;
+        let digits = etag.strip_prefix('"')?.strip_suffix('"')?;
+        let id = u128::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 32)?;
+        Some(Self { content_id: id.to_be_bytes(), limits })
     }
 }
 
@@ -366,10 +510,6 @@ impl ContentRange {
     }
 }
 
-fn etag(headers: &HeaderMap) -> Option<String> {
-    Some(headers.get(header::ETAG)?.to_str().ok()?.to_owned())
-}
-
 /// The cause at the bottom: `Connection refused`, where the top says `error sending request`.
 fn innermost(error: &reqwest::Error) -> String {
     let mut cause: &dyn std::error::Error = error;
@@ -377,13 +517,6 @@ fn innermost(error: &reqwest::Error) -> String {
         cause = deeper;
     }
     cause.to_string()
-}
-
-/// Whether a URL names this machine by its loopback address.
-#[must_use]
-pub fn is_local(url: &Url) -> bool {
-    let host = url.host_str().unwrap_or_default().trim_matches(['[', ']']);
-    host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback())
 }
 
 fn without_secrets(url: &Url) -> String {
@@ -419,9 +552,30 @@ mod tests {
     }
 
     #[test]
+    fn an_offer_of_batches_counts_beside_the_identity_of_the_content_only() {
+        let read = |offer: &str, etag: &str| {
+            let fields = [("lodestream-batch", offer), ("etag", etag)];
+            let field = |(name, value): (&'static str, &str)| {
+                (header::HeaderName::from_static(name), value.parse().expect("a value"))
+            };
+            Offer::read(&fields.map(field).into_iter().collect())
+        };
+        let etag = "\"000102030405060708090a0b0c0d0e0f\"";
+        let offer = read("1; parts=10; bytes=1000; more=x", etag).expect("an offer");
+        assert_eq!(offer.limits, BatchLimits { parts: 10, bytes: 1000 });
+        assert_eq!(offer.content_id[..3], [0, 1, 2]);
+        let greedy = read("1; parts=99999999; bytes=99999999999", etag).expect("an offer");
+        assert_eq!(greedy.limits, BatchLimits { parts: MAX_BATCH_PARTS, bytes: MAX_BATCH_BYTES });
+        for (offer, etag) in [("2; parts=10", etag), ("", etag), ("1; parts=x", etag)] {
+            assert_eq!(read(offer, etag), None, "{offer}");
+        }
+        assert_eq!(read("1; parts=10; bytes=1000", "\"x\""), None);
+    }
+
+    #[test]
     fn secrets_in_a_url_are_not_shown() {
         let url = Url::parse("https://me:pw@a.example/b.lods?signature=x").expect("a URL");
-        let source = HttpSource::new(url).expect("a client");
+        let source = HttpSource::new(url);
         assert_eq!(source.describe(), "https://a.example/b.lods");
     }
 }

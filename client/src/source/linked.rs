@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use super::{Announced, FileSource, Link, SourceError};
+use super::{FileSource, Link, SourceError};
 
 /// A local dataset file whose bytes come as slowly as a [`Link`] lets them.
 ///
@@ -18,6 +18,11 @@ pub struct LinkedSource {
 impl LinkedSource {
     pub(super) const fn new(file: FileSource, link: Arc<Link>) -> Self {
         Self { file, link }
+    }
+
+    /// The file that lies there now, behind the same link.
+    pub(super) fn renew(&self) -> Result<Self, SourceError> {
+        Ok(Self { file: self.file.renew()?, link: Arc::clone(&self.link) })
     }
 
     pub(super) fn describe(&self) -> String {
@@ -42,15 +47,5 @@ impl LinkedSource {
             })
             .await;
         Ok(())
-    }
-
-    pub(super) async fn stream_prefix(
-        &self,
-        len: u64,
-        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
-    ) -> Result<(), SourceError> {
-        let total = self.file.len();
-        let announced = Announced { len: len.min(total), total: Some(total) };
-        self.stream_range(0, announced.len, &mut |piece| sink(piece, announced)).await
     }
 }

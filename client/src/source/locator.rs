@@ -11,7 +11,7 @@ const ACCEPTED: &str =
 /// See [`Source::parse`].
 pub fn parse(text: &str) -> Result<Source, SourceError> {
     match url(text)? {
-        Some(url) => HttpSource::new(url).map(Source::Http),
+        Some(url) => Ok(Source::Http(HttpSource::new(url))),
         None => FileSource::open(text).map(Source::File),
     }
 }

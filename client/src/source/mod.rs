@@ -8,6 +8,7 @@
 
 mod backoff;
 mod blocking;
+mod connector;
 mod error;
 mod fault;
 mod file;
@@ -21,13 +22,16 @@ mod wire;
 use std::sync::Arc;
 
 use bytes::{Bytes, BytesMut};
+use lodestream_protocol::BatchPart;
 
 pub use backoff::Backoff;
 pub use blocking::BlockingSource;
+pub(crate) use connector::Connections;
+pub use connector::{Timeouts, is_local};
 pub use error::SourceError;
 pub use fault::Fault;
 pub use file::FileSource;
-pub use http::{HttpSource, Timeouts, is_local};
+pub use http::HttpSource;
 pub use link::{Link, LinkSpec};
 pub use linked::LinkedSource;
 pub use meter::{Counted, Meter, Traffic};
@@ -68,6 +72,15 @@ pub struct Announced {
     pub total: Option<u64>,
 }
 
+/// What a host that takes requests for many parts takes at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BatchLimits {
+    /// Most parts.
+    pub parts: usize,
+    /// Most bytes of all parts together.
+    pub bytes: u64,
+}
+
 impl Source {
     /// Opens what a user names: a file, `http(s)://host/…/NAME.lods`, or a server's address with a
     /// dataset's name (`http://host:8080/courtyard`, `127.0.0.1:8080/courtyard`).
@@ -86,7 +99,7 @@ impl Source {
     /// [`SourceError::Permanent`] where the text names no URL.
     pub fn by_wire(text: &str, wire: Wire) -> Result<Self, SourceError> {
         let url = Self::parse_url(text)?;
-        HttpSource::by_wire(url, Timeouts::default(), wire).map(Self::Http)
+        Ok(Self::Http(HttpSource::by_wire(url, Timeouts::default(), wire)))
     }
 
     /// The URL of a dataset that a user names, as [`parse`](Self::parse) takes it.
@@ -117,6 +130,34 @@ impl Source {
         }
     }
 
+    /// The source, sharing connections with all others that are used in the same runtime.
+    pub(crate) fn sharing(self, connections: &Connections) -> Self {
+        match self {
+            Self::Http(source) => Self::Http(source.sharing(connections)),
+            Self::File(_) | Self::Linked(_) => self,
+        }
+    }
+
+    /// The host that is asked; `None` for files.
+    pub(crate) fn host(&self) -> Option<&str> {
+        match self {
+            Self::Http(source) => Some(source.url().authority()),
+            Self::File(_) | Self::Linked(_) => None,
+        }
+    }
+
+    /// A source of whatever lies at the same place now, after [`SourceError::Replaced`].
+    ///
+    /// # Errors
+    /// [`SourceError::Permanent`] where there is nothing any more.
+    pub fn renew(&self) -> Result<Self, SourceError> {
+        Ok(match self {
+            Self::Http(source) => Self::Http(source.renew()),
+            Self::File(source) => Self::File(source.renew()?),
+            Self::Linked(source) => Self::Linked(source.renew()?),
+        })
+    }
+
     /// Hands exactly `len` bytes from `offset` to `sink`, piece by piece as they arrive.
     ///
     /// Pieces that were handed out before an error are good.
@@ -135,6 +176,34 @@ impl Source {
             Self::File(source) => source.stream_range(offset, len, sink).await,
             Self::Linked(source) => source.stream_range(offset, len, sink).await,
         }
+    }
+
+    /// What may be asked for by one request, where the host has offered to take many parts.
+    #[must_use]
+    pub fn batch_limits(&self) -> Option<BatchLimits> {
+        match self {
+            Self::Http(source) => source.batch_limits(),
+            Self::File(_) | Self::Linked(_) => None,
+        }
+    }
+
+    /// Hands the bytes of `parts`, one after the other, to `sink` as they arrive: by one request where
+    /// the host [takes such](Self::batch_limits), else by one for each.
+    ///
+    /// # Errors
+    /// As for [`stream_range`](Self::stream_range).
+    pub async fn stream_parts(
+        &self,
+        parts: &[BatchPart],
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<(), SourceError> {
+        if let Self::Http(source) = self {
+            return source.stream_parts(parts, sink).await;
+        }
+        for part in parts {
+            self.stream_range(part.offset, u64::from(part.bytes), sink).await?;
+        }
+        Ok(())
     }
 
     /// Exactly `len` bytes from `offset`.
@@ -171,10 +240,18 @@ impl Source {
         len: u64,
         sink: &mut (dyn FnMut(Bytes, Announced) + Send),
     ) -> Result<(), SourceError> {
+        // Of a file the length is known.
+        let announced = |total: u64| Announced { len: len.min(total), total: Some(total) };
         match self {
             Self::Http(source) => source.stream_prefix(len, sink).await,
-            Self::File(source) => source.stream_prefix(len, sink).await,
-            Self::Linked(source) => source.stream_prefix(len, sink).await,
+            Self::File(source) => {
+                let announced = announced(source.len());
+                source.stream_range(0, announced.len, &mut |piece| sink(piece, announced)).await
+            }
+            Self::Linked(source) => {
+                let announced = announced(source.len());
+                source.stream_range(0, announced.len, &mut |piece| sink(piece, announced)).await
+            }
         }
     }
 

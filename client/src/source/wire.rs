@@ -59,14 +59,14 @@ impl Trip<'_> {
         }
     }
 
-    /// The request has ended.
-    pub(super) fn end(mut self, outcome: Result<(), Fault>) {
+    /// The request has ended; well, where there is no fault.
+    pub(super) fn end(mut self, fault: Option<Fault>) {
         self.is_over = true;
         if let Some((meter, sent)) = self.metered {
-            meter.arrive(sent, Some(outcome));
+            meter.arrive(sent, Some(fault.map_or(Ok(()), Err)));
         }
         if let Some(passage) = self.passage.take()
-            && outcome.is_ok()
+            && fault.is_none()
         {
             passage.end();
         }

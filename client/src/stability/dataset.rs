@@ -96,6 +96,7 @@ impl Built {
             drop_attributes: Vec::new(),
             columns: is_text.then(|| "x,y,z,number".into()),
             scale: None,
+            cells_per_spacing: lodestream_preprocess::CELLS_PER_SPACING,
             cancel: Default::default(),
         };
         let report = build(&config, &Quiet)?;

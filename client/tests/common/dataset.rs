@@ -118,6 +118,7 @@ fn manifest(recipe: Recipe) -> Manifest {
             GroupInfo { name: "base".into(), columns: vec![0, 0] },
             GroupInfo { name: "intensity".into(), columns: vec![0] },
         ],
+        fine: None,
         crs: None,
         sources: vec![],
     }
@@ -220,6 +221,7 @@ impl Layout {
                 self.pages.extend_from_slice(&bytes);
                 page
             });
+            let spacing = (lattice.node_side_world(draft.key.level()) / 32.0) as f32;
             let mask = draft.children.iter().fold(0, |mask, c| mask | 1 << c.key.octant());
             let payloads = draft.payloads.iter().map(|bytes| PayloadRef {
                 offset: 0,
@@ -231,8 +233,9 @@ impl Layout {
                 child_mask: mask,
                 points: draft.points,
                 bounds: draft.bounds,
-                geometric_error: 0.0,
-                spacing: 0.1,
+                // As of a sampled node.
+                geometric_error: if mask == 0 { 0.0 } else { spacing },
+                spacing,
                 normal_cone: None,
                 payloads: payloads.collect(),
                 child_page,

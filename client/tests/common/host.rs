@@ -6,11 +6,16 @@ use std::{
     time::Duration,
 };
 
+use lodestream_client::source::LinkSpec;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     net::{TcpListener, TcpStream},
     sync::mpsc::UnboundedSender,
+    time::{Instant, sleep, sleep_until},
 };
+
+/// Bytes that an answer sends in turn, where the link is slow.
+const TURN_BYTES: usize = 16 << 10;
 
 /// What a request asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +48,8 @@ pub enum Answer {
     Garbage,
     /// As good, with this entity tag.
     Tagged(&'static str),
+    /// As good, with this date instead of an entity tag.
+    Dated(&'static str),
     /// Closes the connection without an answer.
     Close,
 }
@@ -54,6 +61,11 @@ struct State {
     file: Vec<u8>,
     manners: Manners,
     seen: Vec<Request>,
+    link: Option<LinkSpec>,
+    /// When the link has sent what it was given so far.
+    free_at: Option<Instant>,
+    connections: usize,
+    most_connections: usize,
 }
 
 /// A running host; [`stop`](Self::stop) (or dropping it) closes all of its connections at once.
@@ -67,7 +79,15 @@ impl Host {
     /// Starts on a free port.
     pub fn start(file: Vec<u8>, manners: impl FnMut(Request) -> Answer + Send + 'static) -> Self {
         let manners: Manners = Box::new(manners);
-        let state = Arc::new(Mutex::new(State { file, manners, seen: vec![] }));
+        let state = Arc::new(Mutex::new(State {
+            file,
+            manners,
+            seen: vec![],
+            link: None,
+            free_at: None,
+            connections: 0,
+            most_connections: 0,
+        }));
         let mut host = Self { address: ([127, 0, 0, 1], 0).into(), state, runtime: None };
         host.restart();
         host
@@ -85,6 +105,21 @@ impl Host {
     /// Changes how requests are answered from now on.
     pub fn behave(&self, manners: impl FnMut(Request) -> Answer + Send + 'static) {
         self.state.lock().expect("no panic").manners = Box::new(manners);
+    }
+
+    /// Bodies come as slowly as that link lets them, from now on; losses aside.
+    pub fn throttle(&self, link: LinkSpec) {
+        self.state.lock().expect("no panic").link = Some(link);
+    }
+
+    /// Most connections that were open at a time.
+    pub fn most_connections(&self) -> usize {
+        self.state.lock().expect("no panic").most_connections
+    }
+
+    /// Serves another file from now on.
+    pub fn replace(&self, file: Vec<u8>) {
+        self.state.lock().expect("no panic").file = file;
     }
 
     /// Requests seen so far.
@@ -137,6 +172,7 @@ impl Drop for Host {
 }
 
 async fn serve(mut stream: TcpStream, state: Arc<Mutex<State>>) {
+    let _counted = Connection::count(&state);
     // Ends with the connection: an error here is the client's or the test's wish.
     while let Some(range) = read_request(&mut stream).await {
         let (answer, len) = {
@@ -151,6 +187,24 @@ async fn serve(mut stream: TcpStream, state: Arc<Mutex<State>>) {
     }
 }
 
+/// Counts a connection for as long as it is open.
+struct Connection(Arc<Mutex<State>>);
+
+impl Connection {
+    fn count(state: &Arc<Mutex<State>>) -> Self {
+        let mut counted = state.lock().expect("no panic");
+        counted.connections += 1;
+        counted.most_connections = counted.most_connections.max(counted.connections);
+        Self(Arc::clone(state))
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.0.lock().expect("no panic").connections -= 1;
+    }
+}
+
 /// Reads a request's head; `None` at the end of the connection.
 async fn read_request(stream: &mut TcpStream) -> Option<Option<(u64, u64)>> {
     let mut head = Vec::new();
@@ -158,6 +212,9 @@ async fn read_request(stream: &mut TcpStream) -> Option<Option<(u64, u64)>> {
         head.push(stream.read_u8().await.ok()?);
     }
     let head = String::from_utf8(head).ok()?.to_ascii_lowercase();
+    // The body of a batch request.
+    let body = head.lines().find_map(|line| line.strip_prefix("content-length: ")?.parse().ok());
+    stream.read_exact(&mut vec![0; body.unwrap_or(0)]).await.ok()?;
     let range = head.lines().find_map(|line| {
         let (first, last) = line.strip_prefix("range: bytes=")?.trim().split_once('-')?;
         Some((first.parse().ok()?, last.parse::<u64>().ok()? + 1))
@@ -196,40 +253,47 @@ async fn reply(
     match answer {
         Answer::CutShort { share } => {
             send(stream, &good).await?;
-            send(stream, part(share)).await?;
+            send_body(stream, state, part(share)).await?;
             Err(())
         }
         Answer::Hang { share, reached } => {
             send(stream, &good).await?;
-            send(stream, part(share)).await?;
+            send_body(stream, state, part(share)).await?;
             let _ = reached.send(());
             std::future::pending().await
         }
         Answer::Late(delay) => {
-            tokio::time::sleep(delay).await;
+            sleep(delay).await;
             send(stream, &good).await?;
-            send(stream, part(0.5)).await?;
-            tokio::time::sleep(delay).await;
-            send(stream, &body[part(0.5).len()..]).await
+            send_body(stream, state, part(0.5)).await?;
+            sleep(delay).await;
+            send_body(stream, state, &body[part(0.5).len()..]).await
         }
         Answer::WrongRange => {
             let shifted = if start > 0 { (start - 1, end - 1) } else { (start + 1, end + 1) };
             let wrong = head(206, end - start, Some((shifted.0, shifted.1, len + 1)), "\"first\"");
             send(stream, &wrong).await?;
-            send(stream, &body).await
+            send_body(stream, state, &body).await
         }
         Answer::Garbage => {
             let turned: Vec<u8> = body.iter().map(|b| !b).collect();
             send(stream, &good).await?;
-            send(stream, &turned).await
+            send_body(stream, state, &turned).await
         }
         Answer::Tagged(tag) => {
             send(stream, &head(206, end - start, Some((start, end, len)), tag)).await?;
-            send(stream, &body).await
+            send_body(stream, state, &body).await
+        }
+        Answer::Dated(date) => {
+            let mut dated = head(206, end - start, Some((start, end, len)), "");
+            let line = format!("Last-Modified: {date}\r\n\r\n");
+            dated.splice(dated.len() - 2.., line.into_bytes());
+            send(stream, &dated).await?;
+            send_body(stream, state, &body).await
         }
         _ => {
             send(stream, &good).await?;
-            send(stream, &body).await
+            send_body(stream, state, &body).await
         }
     }
 }
@@ -248,4 +312,23 @@ fn head(status: u16, length: u64, range: Option<(u64, u64, u64)>, tag: &str) -> 
 
 async fn send(stream: &mut TcpStream, bytes: &[u8]) -> Result<(), ()> {
     stream.write_all(bytes).await.map_err(|_| ())
+}
+
+/// Sends as slowly as the link wants it.
+async fn send_body(stream: &mut TcpStream, state: &Mutex<State>, body: &[u8]) -> Result<(), ()> {
+    let link = state.lock().expect("no panic").link;
+    let Some(link) = link else { return send(stream, body).await };
+    sleep(link.round_trip).await;
+    for turn in body.chunks(TURN_BYTES) {
+        let takes = Duration::from_secs_f64(turn.len() as f64 * 8.0 / link.bits_per_second);
+        let end = {
+            let (mut state, now) = (state.lock().expect("no panic"), Instant::now());
+            let end = state.free_at.map_or(now, |free| free.max(now)) + takes;
+            state.free_at = Some(end);
+            end
+        };
+        sleep_until(end).await;
+        send(stream, turn).await?;
+    }
+    Ok(())
 }

@@ -37,6 +37,7 @@ impl World {
             drop_attributes: Vec::new(),
             columns: None,
             scale: None,
+            cells_per_spacing: lodestream_preprocess::CELLS_PER_SPACING,
             cancel: Default::default(),
         };
         build(&config, &Silent).expect("built");

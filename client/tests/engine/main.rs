@@ -3,10 +3,16 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod batches;
+mod clouds;
 mod hosts;
 mod jumps;
+mod many;
 mod picture;
+mod precision;
+mod priority;
 mod refinement;
 mod simulated;
+mod soak;
 mod sources;
 mod tasked;

@@ -1,38 +1,19 @@
 //! Engines, cameras, and plans that can be compared.
 
-use std::{collections::BTreeMap, path::Path, time::Duration};
+use std::{path::Path, time::Duration};
 
 use glam::DVec3;
 use lodestream_client::{
     camera::Camera,
-    engine::{Engine, EngineConfig, EngineError, FramePlan, View},
+    engine::{Engine, EngineConfig, EngineError, View},
     source::{HttpSource, Source, Timeouts},
 };
-use lodestream_protocol::NodeKey;
 
+pub use crate::common::drawn::{Picture, picture};
 use crate::common::host::Host;
 
 /// Long enough for any machine; a test that waits this long has failed.
 pub const LONG: Duration = Duration::from_secs(120);
-
-/// Cloud and node → number of points and a checksum of positions and columns.
-pub type Picture = BTreeMap<(usize, NodeKey), (usize, u32)>;
-
-/// What a plan draws.
-pub fn picture(plan: &FramePlan) -> Picture {
-    let nodes = plan.nodes.iter().map(|node| {
-        let mut crc = crc32fast::Hasher::new();
-        node.points.positions.iter().flatten().for_each(|q| crc.update(&q.to_le_bytes()));
-        for column in &node.points.columns {
-            crc.update(&[column.attribute as u8]);
-            crc.update(&column.bytes);
-        }
-        ((node.cloud, node.key), (node.points.positions.len(), crc.finalize()))
-    });
-    let picture: Picture = nodes.collect();
-    assert_eq!(picture.len(), plan.nodes.len(), "no node is drawn twice");
-    picture
-}
 
 /// A view of everything, from a corner of the room of the datasets.
 pub fn overview(corner: [f64; 3]) -> View {
@@ -68,7 +49,7 @@ pub fn http_source(host: &Host) -> Source {
 pub fn source_with_patience(host: &Host, patience: Duration) -> Source {
     let timeouts = Timeouts { connect: patience, silence: patience };
     let url = host.url().parse().expect("a URL");
-    Source::Http(HttpSource::with_timeouts(url, timeouts).expect("a client"))
+    Source::Http(HttpSource::with_timeouts(url, timeouts))
 }
 
 /// What the local file settles on.

@@ -45,7 +45,9 @@ fn neighbours_share_requests_and_figures_match_the_host() {
 fn a_further_group_is_fetched_only_when_it_is_wanted() {
     let recipe = Recipe::default();
     let host = Host::good(dataset(recipe));
-    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+    // Nodes are worth their bytes: within a bound, others would be drawn.
+    let config = EngineConfig { point_budget: u64::MAX, ..config() };
+    let engine = Engine::start(vec![http_source(&host)], config).expect("starts");
     engine.set_view(overview(recipe.corner));
     let plain = engine.wait_settled(LONG).expect("settles");
     assert!(plain.nodes.iter().all(|node| node.points.column(1).is_none()));

@@ -32,6 +32,8 @@ fn figures(engine: &SimulatedEngine) -> EngineStats {
     let mut stats = engine.stats();
     stats.since_start.totals.decode_ms = 0.0;
     stats.since_view.totals.decode_ms = 0.0;
+    stats.since_start.totals.plan_ms = 0.0;
+    stats.since_view.totals.plan_ms = 0.0;
     stats
 }
 

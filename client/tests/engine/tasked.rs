@@ -32,7 +32,7 @@ fn metered(host: &Host, meter: &Arc<Meter>) -> Source {
     let timeouts = Timeouts { connect: LONG, silence: LONG };
     let wire = Wire { link: None, meter: Some(Arc::clone(meter)) };
     let url = host.url().parse().expect("a URL");
-    Source::Http(HttpSource::by_wire(url, timeouts, wire).expect("a client"))
+    Source::Http(HttpSource::by_wire(url, timeouts, wire))
 }
 
 fn meter() -> Arc<Meter> {

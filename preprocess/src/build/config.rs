@@ -45,9 +45,24 @@ pub struct BuildConfig {
     pub columns: Option<String>,
     /// Lattice step in world units; `None`: the inputs' own, or far below the point spacing.
     pub scale: Option<f64>,
+    /// Positions are stored in two parts: cells of this part of a node's spacing, and where in its cell
+    /// each point lies. A power of two up to 256; 0: in one part.
+    pub cells_per_spacing: u32,
     /// Set to stop the build.
     pub cancel: Arc<AtomicBool>,
 }
+
+/// For [`BuildConfig::cells_per_spacing`]. On Autzen (960 x 540, a million points, 20 Mbit/s and 40 ms; positions
+/// exact where cells would take up half a pixel), from a cold start:
+///
+/// | cells | bytes of cells a point | SSIM 0.95 in the medium view after | SSIM of the near view, bytes |
+/// | --- | --- | --- | --- |
+/// | 1 | 0.94 | 1.15 s, 2.58 MB | 0.840, 4.23 MB |
+/// | 2 | 1.31 | 0.95 s, 2.05 MB | 0.839, 3.57 MB |
+/// | 4 | 1.69 | 0.85 s, 1.79 MB | 0.858, 3.50 MB |
+/// | 8 | 2.06 | 0.85 s, 1.85 MB | 0.871, 3.63 MB |
+/// | whole | 3.29 | 1.20 s | 0.885, 5.05 MB |
+pub const CELLS_PER_SPACING: u32 = 8;
 
 impl BuildConfig {
     /// Refuses numbers that mean nothing.
@@ -56,6 +71,12 @@ impl BuildConfig {
             return Err(Error::Setup(format!(
                 "--grid {}: must be a power of two from 4 to 1024",
                 self.grid
+            )));
+        }
+        let cells = self.cells_per_spacing;
+        if cells > 256 || (cells > 0 && !cells.is_power_of_two()) {
+            return Err(Error::Setup(format!(
+                "--cells {cells}: must be 0 or a power of two up to 256"
             )));
         }
         if self.scale.is_some_and(|s| !(s.is_finite() && s > 0.0)) {

@@ -6,7 +6,7 @@ use lodestream_protocol::{LatticeBox, MortonCode, NodeKey};
 use rayon::prelude::*;
 
 use crate::{
-    chunk::{self, Context},
+    chunk::{self, Context, Detail},
     cones::Normals,
     encode::{NodeEncoder, OutNode, Ranges},
     error::Result,
@@ -103,20 +103,25 @@ fn join_with<C: MortonCode>(
             let own: Vec<u32> = sampled.points_of(&tree, depth, index).collect();
             let mut encoder = NodeEncoder::new(context.layout);
             let tight = bounds[depth][index];
-            let mut out =
-                chunk::encode_node(context, &mut encoder, node, tight, part, &codes, &own, row)?;
+            // A leaf here is a chunk's root: what is below it is there already.
+            let root = node.is_leaf().then(|| root_of(node.key)).flatten();
+            let (child_mask, below) =
+                root.map_or((node.child_mask, 0), |r| (roots[r].child_mask, roots[r].points));
+            let level = node.key.level();
+            let detail = Detail::of(context, level, child_mask == 0, tight, below);
+            let mut out = chunk::encode_node(
+                context,
+                &mut encoder,
+                node,
+                tight,
+                detail,
+                part,
+                &codes,
+                &own,
+                row,
+            )?;
+            out.child_mask = child_mask;
             out.normal_cone = normals[depth][index].map(|normals| normals.cone);
-            if let Some(root) = node.is_leaf().then(|| root_of(node.key)).flatten() {
-                let guaranteed = context.manifest.spacing_world(node.key.level());
-                out.child_mask = roots[root].child_mask;
-                if out.child_mask != 0 {
-                    out.geometric_error = guaranteed as f32;
-                    out.spacing = guaranteed as f32;
-                } else {
-                    let mean = chunk::leaf_spacing(context, tight, roots[root].points);
-                    out.spacing = mean.min(guaranteed) as f32;
-                }
-            }
             Ok((out, encoder.buffers, encoder.ranges))
         })
         .collect::<Result<_>>()?;

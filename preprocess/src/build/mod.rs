@@ -27,7 +27,7 @@ use crate::{
     target::folder_of,
 };
 
-pub use config::{BuildConfig, Method};
+pub use config::{BuildConfig, CELLS_PER_SPACING, Method};
 pub use phases::Progress;
 pub use report::{BuildReport, ColumnBytes, Dropped, PhaseSeconds};
 
@@ -139,7 +139,7 @@ fn build_in_pool(job: &Job) -> Result<BuildReport> {
     manifest.levels = nodes.last().map_or(0, |n| n.key.level() + 1);
     ranges.fill(&mut manifest);
 
-    phases.begin("write", ranges.column_bytes.iter().sum(), "bytes");
+    phases.begin("write", ranges.fine_bytes + ranges.column_bytes.iter().sum::<u64>(), "bytes");
     let written = assemble::write(&config.output, &manifest, &nodes, &blobs.finish(), &|bytes| {
         progress.advance(bytes);
         job.check()
@@ -163,7 +163,7 @@ fn build_in_pool(job: &Job) -> Result<BuildReport> {
         peak_memory_bytes: memory::peak_bytes(),
         file_bytes: written.file_bytes,
         index_bytes: written.index_bytes,
-        columns: ColumnBytes::of(&manifest, &ranges.column_bytes),
+        columns: ColumnBytes::of(&manifest, &ranges),
         warnings,
     })
 }

@@ -1,7 +1,7 @@
 //! The second phase: the lattice is chosen, the chunks are planned, the columns laid out.
 
 use lodestream_protocol::{
-    LatticeBox, Manifest, Method as ManifestMethod, Primitive, Refinement, SourceInfo,
+    Fine, LatticeBox, Manifest, Method as ManifestMethod, Primitive, Refinement, SourceInfo,
 };
 
 use super::{Job, chunks, read::Read};
@@ -73,7 +73,10 @@ pub(super) fn plan(job: &Job, read: Read, warnings: &mut Vec<String>) -> Result<
         warnings.push(format!("coordinates are rounded to multiples of {step:e}"));
     }
     let constant = constant_attributes(&read.schema, &scan.constant_bytes);
-    let layout = Layout::new(&read.schema, &constant, &scan.first_row);
+    // Where the root has no cells, no node has.
+    let cells = config.cells_per_spacing;
+    let has_fine = cells > 0 && choice.lattice.side_bits > (cells * config.grid).ilog2() as u8;
+    let layout = Layout::new(&read.schema, &constant, &scan.first_row, has_fine);
     let sources = read.names.into_iter().zip(points_per_input);
     let manifest = Manifest {
         generator: concat!("lodestream ", env!("CARGO_PKG_VERSION")).into(),
@@ -92,6 +95,7 @@ pub(super) fn plan(job: &Job, read: Read, warnings: &mut Vec<String>) -> Result<
         largest_rounding: scan.rounding,
         attributes: layout.attributes.clone(),
         groups: layout.groups.clone(),
+        fine: layout.fine.map(|group| Fine { group, cells_per_spacing: cells }),
         crs: read.crs,
         sources: sources.map(|(name, points)| SourceInfo { name, points }).collect(),
     };

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use lodestream_protocol::Manifest;
 use serde::Serialize;
 
+use crate::encode::Ranges;
+
 /// What was built. Also the `--report` of `lodestream build`.
 #[derive(Debug, Clone, Serialize)]
 pub struct BuildReport {
@@ -74,11 +76,13 @@ pub struct ColumnBytes {
 }
 
 impl ColumnBytes {
-    /// Of the positions, then of every attribute.
-    pub(super) fn of(manifest: &Manifest, bytes: &[u64]) -> Vec<Self> {
+    /// Of the positions, of every attribute, then of fine positions.
+    pub(super) fn of(manifest: &Manifest, ranges: &Ranges) -> Vec<Self> {
         let names = manifest.attributes.iter().map(|attribute| attribute.name.as_str());
-        let columns = std::iter::once("position").chain(names).zip(bytes);
+        let columns = std::iter::once("position").chain(names).zip(&ranges.column_bytes);
+        let fine = manifest.fine.map(|_| ("position, fine", &ranges.fine_bytes));
         columns
+            .chain(fine)
             .map(|(name, &bytes)| Self {
                 name: name.into(),
                 bytes,

@@ -47,6 +47,7 @@ impl Parts {
             drop_attributes: Vec::new(),
             columns: Some(COLUMNS.into()),
             scale: None,
+            cells_per_spacing: crate::CELLS_PER_SPACING,
             cancel: Arc::default(),
         };
         build(&config, &Quiet).expect("builds");

@@ -44,6 +44,10 @@ pub struct BuildArgs {
     /// Lattice step in world units [default: the inputs' own, or far below the point spacing]
     #[arg(long, value_name = "STEP", value_parser = step)]
     pub scale: Option<f64>,
+    /// Cells per spacing that positions are told to at first, a power of two up to 256; what is finer lies apart,
+    /// for views that show it. 0: positions in one part
+    #[arg(long, value_name = "CELLS", default_value_t = preprocess::CELLS_PER_SPACING)]
+    pub cells: u32,
 }
 
 /// Methods, as the command line names them.
@@ -76,6 +80,7 @@ pub fn run(args: BuildArgs) -> anyhow::Result<ExitCode> {
         drop_attributes: args.drop,
         columns: args.columns,
         scale: args.scale,
+        cells_per_spacing: args.cells,
         cancel: cancel_on_interrupt()?,
     };
     let progress = TerminalProgress::default();

@@ -1,92 +1,149 @@
 //! A dataset's file: whole, by range, or not again.
+//!
+//! Under its name a dataset may be replaced by another: what came from there is asked for again
+//! after a minute (with `If-None-Match`, which costs no more than a head). With `?v=` and the entity
+//! tag, without its quotes, the same address means this very content, which never changes; once it is
+//! replaced, there is nothing under that address. The index tells both.
 
 use std::{sync::Arc, time::SystemTime};
 
 use axum::{
     body::Body,
-    extract::{Path, State},
-    http::{HeaderMap, HeaderValue, Method, StatusCode, header, response::Builder},
+    extract::{Path, RawQuery, State},
+    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header, response::Builder},
     response::{IntoResponse, Response},
 };
 
-use super::{Refusal, Site};
+use super::{Refusal, Site, batch};
 use crate::{
     body::FileBody,
     conditional::Verdict,
     file::{DatasetFile, OpenError},
+    multipart,
     range::Selection,
 };
 
-/// A dataset never changes under its name.
-const FOREVER: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
+/// How long what comes from an address may be kept. Content never changes under the address that names
+/// it; under its name, a dataset may be replaced.
+pub(crate) const fn cache_control(by_content: bool) -> &'static str {
+    if by_content { "public, max-age=31536000, immutable" } else { "public, max-age=60" }
+}
+
+const OFFER: HeaderValue = HeaderValue::from_static(batch::OFFER);
+const BYTES: HeaderValue = HeaderValue::from_static("bytes");
+const DATASET_TYPE: HeaderValue = HeaderValue::from_static(multipart::DATASET_TYPE);
+
+/// Tells clients that they may ask for batches.
+pub(super) const BATCH_OFFER: HeaderName = HeaderName::from_static("lodestream-batch");
 
 /// `GET` and `HEAD` of a dataset. (For `HEAD` axum drops the body, which has read nothing yet.)
 pub(super) async fn dataset(
     State(site): State<Arc<Site>>,
     Path(file_name): Path<String>,
+    RawQuery(query): RawQuery,
     method: Method,
     headers: HeaderMap,
 ) -> Response {
+    match open(&site, &file_name, query.as_deref()).await {
+        Ok(opened) => answer(&site, opened, &method, &headers),
+        Err(refusal) => refusal.into_response(),
+    }
+}
+
+/// A file to be served.
+pub(super) struct Opened {
+    pub(super) file: Arc<DatasetFile>,
+    /// Whether the address names this very content.
+    by_content: bool,
+}
+
+/// Opens the dataset of that name.
+pub(super) async fn open(
+    site: &Arc<Site>,
+    file_name: &str,
+    query: Option<&str>,
+) -> Result<Opened, Refusal> {
     let missing = || {
         let line = format!("no dataset file {file_name:?} here; /datasets lists all");
-        Refusal::new(StatusCode::NOT_FOUND, line).into_response()
+        Refusal::new(StatusCode::NOT_FOUND, line)
     };
-    let Some(path) = site.folder.path_of(&file_name) else { return missing() };
-    match site.offload.run(move || DatasetFile::open(path)).await {
-        Ok(file) => answer(&site, file, &method, &headers),
-        Err(OpenError::Missing) => missing(),
+    let file = match site.dataset(file_name).await.ok_or_else(missing)? {
+        Ok(file) => file,
+        Err(OpenError::Missing) => return Err(missing()),
         Err(OpenError::Unreadable(reason)) => {
             tracing::warn!("{file_name}: {reason}");
             // It may be on its way into the folder: worth another try.
             let line = format!("{file_name} cannot be served: {reason}");
-            Refusal::new(StatusCode::SERVICE_UNAVAILABLE, line).into_response()
+            return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, line));
         }
+    };
+    let version = query.and_then(|query| query.split('&').find_map(|p| p.strip_prefix("v=")));
+    if version.is_some_and(|version| version != file.validators.etag.trim_matches('"')) {
+        let line = format!("{file_name} holds other content than that by now; see /datasets");
+        return Err(Refusal::new(StatusCode::NOT_FOUND, line));
     }
+    Ok(Opened { file, by_content: version.is_some() })
 }
 
-fn answer(site: &Site, file: DatasetFile, method: &Method, headers: &HeaderMap) -> Response {
+fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> Response {
+    let Opened { file, by_content } = opened;
     let length = file.bytes;
-    let mut response = Response::builder().header(header::ETAG, &file.validators.etag);
-    if let Some(modified) = file.validators.modified {
-        response = response.header(header::LAST_MODIFIED, modified.to_string());
+    let verdict = file.validators.judge(headers);
+    if verdict == Verdict::Failed {
+        let line = "the dataset is not the one asked for (If-Match or If-Unmodified-Since)";
+        return Refusal::new(StatusCode::PRECONDITION_FAILED, line).into_response();
     }
-    match file.validators.judge(headers) {
-        Verdict::Failed => {
-            let line = "the dataset is not the one asked for (If-Match or If-Unmodified-Since)";
-            return Refusal::new(StatusCode::PRECONDITION_FAILED, line).into_response();
-        }
-        Verdict::NotModified => {
-            let response = response.header(header::CACHE_CONTROL, FOREVER);
-            return finish(response.status(StatusCode::NOT_MODIFIED), Body::empty());
-        }
-        Verdict::Proceed => {}
+    let mut response = Response::builder()
+        .header(header::ETAG, &file.etag)
+        .header(header::CACHE_CONTROL, HeaderValue::from_static(cache_control(by_content)));
+    if let Some(modified) = &file.last_modified {
+        response = response.header(header::LAST_MODIFIED, modified);
     }
-    // Ranges are defined for `GET` alone (RFC 9110, section 14.2).
+    if verdict == Verdict::NotModified {
+        return finish(response.status(StatusCode::NOT_MODIFIED), Body::empty());
+    }
+    // Ranges are defined for `GET` alone (section 14.2).
     let is_ranged =
         method == Method::GET && file.validators.range_applies(headers, SystemTime::now());
     let selection = if is_ranged { Selection::of(headers, length) } else { Selection::Whole };
-    let response = response.header(header::ACCEPT_RANGES, "bytes");
-    let (response, range) = match selection {
-        Selection::Whole => (response.status(StatusCode::OK), 0..length),
+    let refuse = |line: &str| {
+        let content = [(header::CONTENT_RANGE, format!("bytes */{length}"))];
+        (content, Refusal::new(StatusCode::RANGE_NOT_SATISFIABLE, line)).into_response()
+    };
+    response = response.header(header::ACCEPT_RANGES, BYTES);
+    let pool = Arc::clone(&site.buffers);
+    let (response, content_type, body) = match selection {
+        Selection::Whole => {
+            let response = response.status(StatusCode::OK).header(BATCH_OFFER, OFFER);
+            (response, DATASET_TYPE, FileBody::new(file, 0..length, pool))
+        }
         Selection::Part(range) => {
             let content = format!("bytes {}-{}/{length}", range.start, range.end - 1);
-            let response = response.header(header::CONTENT_RANGE, content);
-            (response.status(StatusCode::PARTIAL_CONTENT), range)
+            let mut response =
+                response.status(StatusCode::PARTIAL_CONTENT).header(header::CONTENT_RANGE, content);
+            // Whoever reads a dataset asks for its beginning first.
+            if range.start == 0 {
+                response = response.header(BATCH_OFFER, OFFER);
+            }
+            (response, DATASET_TYPE, FileBody::new(file, range, pool))
+        }
+        Selection::Parts(ranges) => {
+            let content_type = HeaderValue::try_from(multipart::content_type());
+            let content_type = content_type.expect("the boundary is hexadecimal");
+            let body = FileBody::of(file, multipart::segments(ranges, length), pool);
+            (response.status(StatusCode::PARTIAL_CONTENT), content_type, body)
         }
         Selection::Unsatisfiable => {
-            let line = format!("the range starts beyond the dataset's {length} bytes");
-            let refusal = Refusal::new(StatusCode::RANGE_NOT_SATISFIABLE, line);
-            let content = [(header::CONTENT_RANGE, format!("bytes */{length}"))];
-            return (content, refusal).into_response();
+            return refuse(&format!("the range starts beyond the dataset's {length} bytes"));
         }
+        Selection::Refused(reason) => return refuse(reason),
     };
     let response = response
-        .header(header::CACHE_CONTROL, FOREVER)
-        .header(header::CONTENT_TYPE, "application/octet-stream")
-        .header(header::CONTENT_LENGTH, range.end - range.start);
-    finish(response, Body::new(FileBody::new(Arc::new(file), range, Arc::clone(&site.buffers))))
+        .header(header::CONTENT_TYPE, content_type)
+        .header(header::CONTENT_LENGTH, body.left());
+    finish(response, Body::new(body))
 }
 
-fn finish(response: Builder, body: Body) -> Response {
+pub(super) fn finish(response: Builder, body: Body) -> Response {
     response.body(body).expect("tag, date and numbers are valid field values")
 }

@@ -1,8 +1,11 @@
 //! What the server answers, one file per resource.
 
+mod batch;
+mod compressed;
 mod dataset;
 mod health;
 mod list;
+mod options;
 mod page;
 
 use std::{
@@ -27,17 +30,27 @@ use crate::{
     buffers::BufferPool,
     config::ServeConfig,
     error::Result,
+    file::{DatasetFile, OpenError},
     folder::Folder,
     index::{DatasetIndex, IndexCache},
     offload::Offload,
+    open_files::{OpenFiles, SWEEP_INTERVAL},
+    private_copy::PrivateCopies,
 };
+
+use self::compressed::compressed;
+
+pub(crate) use batch::OFFER as BATCH_OFFER;
+pub(crate) use dataset::cache_control;
 
 /// What all requests share.
 #[derive(Debug)]
 pub(crate) struct Site {
     folder: Folder,
     index: IndexCache,
-    buffers: Arc<BufferPool>,
+    open_files: OpenFiles,
+    pub(crate) buffers: Arc<BufferPool>,
+    pub(crate) private_copies: Arc<PrivateCopies>,
     offload: Offload,
 }
 
@@ -46,9 +59,31 @@ impl Site {
         Ok(Arc::new(Self {
             folder: Folder::open(config.dir.clone())?,
             index: IndexCache::default(),
+            open_files: OpenFiles::default(),
             buffers: Arc::default(),
+            private_copies: Arc::default(),
             offload: Offload::new(),
         }))
+    }
+
+    /// The dataset's file; `None` where no dataset can be called that.
+    pub(crate) async fn dataset(
+        self: &Arc<Self>,
+        file_name: &str,
+    ) -> Option<Result<Arc<DatasetFile>, OpenError>> {
+        let path = self.folder.path_of(file_name)?;
+        let site = Arc::clone(self);
+        Some(self.offload.run(move || site.open_files.open(path)).await)
+    }
+
+    /// Lets go of files that nobody asks for any more, now and then; never ends.
+    pub(crate) async fn sweep(self: Arc<Self>) {
+        loop {
+            tokio::time::sleep(SWEEP_INTERVAL).await;
+            let site = Arc::clone(&self);
+            // It fails only where it panics, which is on standard error then.
+            let _ = tokio::task::spawn_blocking(move || site.open_files.sweep()).await;
+        }
     }
 
     /// Reads the folder, off the runtime's threads.
@@ -64,21 +99,30 @@ impl Site {
 /// All routes over a site.
 pub(crate) fn router(site: Arc<Site>, response_timeout: Duration) -> Router {
     Router::new()
-        .route("/", get(page::page))
-        .route("/datasets", get(list::list))
+        .route("/", compressed(get(page::page)))
+        .route("/datasets", compressed(get(list::list)))
         .route("/datasets/{file}", get(dataset::dataset))
+        .route("/datasets/{file}/batch", batch::route())
         .route("/healthz", get(health::health))
         .route("/{file}", get(dataset::dataset))
+        .route("/{file}/batch", batch::route())
         .fallback(async || Refusal::new(StatusCode::NOT_FOUND, "nothing here; see /datasets"))
         .with_state(site)
         .layer(TimeoutLayer::with_status_code(StatusCode::GATEWAY_TIMEOUT, response_timeout))
         .layer(cross_origin())
+        .layer(middleware::from_fn(options::options))
         .layer(middleware::from_fn(log_request))
 }
 
+/// What the CORS layer adds to every answer, for the answers that it does not see.
+pub(crate) const CROSS_ORIGIN_FIELDS: &str = "access-control-allow-origin: *\r\n\
+     access-control-expose-headers: lodestream-batch,accept-ranges,content-length,content-range,etag,\
+     last-modified\r\n";
+
 /// Datasets are public: any page may read them, and see the fields that range clients need.
 fn cross_origin() -> CorsLayer {
-    const ASKED: [HeaderName; 6] = [
+    const ASKED: [HeaderName; 7] = [
+        header::CONTENT_TYPE,
         header::RANGE,
         header::IF_RANGE,
         header::IF_MATCH,
@@ -86,7 +130,8 @@ fn cross_origin() -> CorsLayer {
         header::IF_MODIFIED_SINCE,
         header::IF_UNMODIFIED_SINCE,
     ];
-    const TOLD: [HeaderName; 5] = [
+    const TOLD: [HeaderName; 6] = [
+        dataset::BATCH_OFFER,
         header::ACCEPT_RANGES,
         header::CONTENT_LENGTH,
         header::CONTENT_RANGE,
@@ -95,7 +140,7 @@ fn cross_origin() -> CorsLayer {
     ];
     CorsLayer::new()
         .allow_origin(Any)
-        .allow_methods([Method::GET, Method::HEAD])
+        .allow_methods([Method::GET, Method::HEAD, Method::POST])
         .allow_headers(ASKED)
         .expose_headers(TOLD)
         .max_age(Duration::from_secs(24 * 60 * 60))
@@ -142,6 +187,8 @@ impl IntoResponse for Refusal {
         let fields = [
             (header::CONTENT_TYPE, "text/plain; charset=utf-8"),
             (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+            // What is not there may be a moment later.
+            (header::CACHE_CONTROL, "no-store"),
         ];
         (self.status, fields, format!("{}\n", self.line)).into_response()
     }

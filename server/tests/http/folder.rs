@@ -21,6 +21,7 @@ async fn the_index_tells_what_datasets_hold() {
             "datasets": [{
                 "name": "a",
                 "url": "datasets/a.lods",
+                "content_url": format!("datasets/a.lods?v={}", header.content_id_hex()),
                 "points": 0,
                 "bytes": bytes.len(),
                 "levels": 0,

@@ -1,52 +1,11 @@
-//! A served folder, and files for it.
+//! A served folder.
 
 use std::{fs, net::SocketAddr, path::PathBuf};
 
-use lodestream_protocol::{
-    Attribute, Boot, Domain, GroupInfo, HierarchyPage, Lattice, LatticeBox, Manifest, Method,
-    Primitive, Refinement, ScalarType, Storage,
-};
 use lodestream_server::{RunningServer, ServeConfig, spawn};
 use reqwest::{Method as HttpMethod, Response, header::HeaderMap};
 
-/// A dataset without points, followed by `tail` filler bytes: sound to its header, and all that a
-/// host looks at.
-pub fn dataset(seed: u8, tail: usize) -> Vec<u8> {
-    let lattice = Lattice { scale: 0.01, offset: [0.0; 3], origin: [0; 3], side_bits: 10 };
-    let color = Attribute {
-        name: "color".into(),
-        scalar: ScalarType::U8,
-        components: 3,
-        domain: Domain::Element,
-        storage: Storage::Column { group: 0 },
-        min: vec![],
-        max: vec![],
-    };
-    let manifest = Manifest {
-        generator: format!("test {seed}"),
-        points: 0,
-        nodes: 0,
-        levels: 0,
-        refinement: Refinement::Additive,
-        primitive: Primitive::Point,
-        method: Method { name: "poisson".into(), grid: 128, leaf_capacity: 16384 },
-        lattice,
-        bounds: LatticeBox::EMPTY,
-        largest_rounding: 0.0,
-        attributes: vec![color],
-        groups: vec![GroupInfo { name: "base".into(), columns: vec![0, 0] }],
-        crs: None,
-        sources: vec![],
-    };
-    let page = HierarchyPage::encode(&[], vec![0], &lattice).expect("an empty page");
-    let mut bytes = Boot::encode(&manifest, &page, 0, tail as u64).expect("a sound manifest");
-    let mut state = u32::from(seed) + 1;
-    bytes.extend((0..tail).map(|_| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 24) as u8
-    }));
-    bytes
-}
+pub use crate::file::dataset;
 
 /// A server over a temporary folder.
 pub struct Site {
@@ -87,11 +46,21 @@ impl Site {
     }
 
     pub async fn send(&self, method: HttpMethod, path: &str, fields: &[(&str, &str)]) -> Response {
+        self.send_body(method, path, fields, Vec::new()).await
+    }
+
+    pub async fn send_body(
+        &self,
+        method: HttpMethod,
+        path: &str,
+        fields: &[(&str, &str)],
+        body: Vec<u8>,
+    ) -> Response {
         let mut request = self.client.request(method, format!("{}{path}", self.server.url()));
         for (name, value) in fields {
             request = request.header(*name, *value);
         }
-        request.send().await.expect("the server answers")
+        request.body(body).send().await.expect("the server answers")
     }
 
     pub async fn get(&self, path: &str, fields: &[(&str, &str)]) -> Response {

@@ -118,6 +118,7 @@ impl Maker {
             largest_rounding: 0.0,
             attributes,
             groups: groups.into(),
+            fine: None,
             crs: None,
             sources: Vec::new(),
         };

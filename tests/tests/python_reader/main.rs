@@ -33,6 +33,7 @@ fn build(input: &str, grid: u32) -> Vec<u8> {
         drop_attributes: Vec::new(),
         columns: None,
         scale: None,
+        cells_per_spacing: lodestream_preprocess::CELLS_PER_SPACING,
         cancel: Arc::default(),
     };
     lodestream_preprocess::build(&config, &Quiet).expect("a dataset");

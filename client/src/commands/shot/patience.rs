@@ -1,20 +1,17 @@
 //! Waiting that an interrupt ends.
 
 use std::{
-    sync::atomic::{AtomicBool, Ordering},
+    sync::atomic::AtomicBool,
     time::{Duration, Instant},
 };
 
-use crate::engine::{Engine, EngineError};
+use crate::{
+    engine::{Engine, EngineError},
+    interrupt::go_on,
+};
 
 /// How long a wait may go on before it looks for an interrupt.
 const TURN: Duration = Duration::from_millis(50);
-
-/// Fails once the flag is set.
-pub(super) fn go_on(cancel: &AtomicBool) -> anyhow::Result<()> {
-    anyhow::ensure!(!cancel.load(Ordering::Relaxed), "interrupted");
-    Ok(())
-}
 
 /// Waits for the engine in short turns, `timeout` in all.
 ///
@@ -65,6 +62,8 @@ pub(super) fn wait_until(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::Ordering;
+
     use super::*;
 
     fn late() -> EngineError {

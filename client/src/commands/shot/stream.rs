@@ -67,10 +67,7 @@ impl Stream {
 
     /// Asks for the attributes that pictures of such settings need, whatever their cameras.
     pub fn set_attributes(&self, settings: &RenderSettings) {
-        let needed = self.clouds.iter().flat_map(|cloud| {
-            let name = |a: usize| cloud.attributes[a].name.clone();
-            settings.attributes(cloud).into_iter().map(name).collect::<Vec<_>>()
-        });
+        let needed = self.clouds.iter().flat_map(|cloud| settings.attribute_names(cloud));
         self.engine.set_attributes(needed.collect());
     }
 
@@ -88,7 +85,7 @@ impl Stream {
         plan: &FramePlan,
         settings: &RenderSettings,
     ) -> Result<Frame, RenderError> {
-        let scene = Scene { clouds: &self.clouds, nodes: &plan.nodes };
+        let scene = Scene { clouds: &plan.clouds, nodes: &plan.nodes };
         self.renderer.render(&scene, settings, &mut |e| tell(e, &mut self.fallback))
     }
 

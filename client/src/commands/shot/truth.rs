@@ -10,23 +10,20 @@ use std::{
 
 use anyhow::Context;
 use lodestream_preprocess::Progress;
-use lodestream_protocol::{Dataset, Manifest, Node, ReadAt, Refinement};
+use lodestream_protocol::{Dataset, Manifest, Node, ReadAt};
 use lodestream_server::commands::TerminalProgress;
-use rayon::prelude::*;
 
-use super::{Shot, ShotArgs, ShotReport, patience};
+use super::{Shot, ShotArgs, ShotReport};
 use crate::{
     camera::Camera,
-    engine::DrawNode,
+    full_resolution,
+    interrupt::go_on,
     render::{Coloring, Frame, RenderSettings, TruthRenderer, VisibleTree},
     source::{BlockingSource, Source},
 };
 
 /// Samples along each side of a pixel.
 const SAMPLES: u32 = 4;
-
-/// Points that are read and decoded at a time, by all cores.
-const BATCH_POINTS: u64 = 1 << 20;
 
 /// The sources, open, with all of their nodes known.
 pub(super) struct Truth {
@@ -51,7 +48,8 @@ impl Truth {
         let colorings = args.colorings(&clouds);
         let mut hierarchies = Vec::new();
         for (dataset, text) in datasets.iter().zip(&args.sources) {
-            hierarchies.push(full_resolution(dataset).with_context(|| text.clone())?);
+            let nodes = dataset.hierarchy().with_context(|| text.clone())?;
+            hierarchies.push(full_resolution::nodes(dataset.manifest().refinement, nodes));
         }
         let progress = TerminalProgress::default();
         Ok(Self { clouds, colorings, datasets, hierarchies, progress })
@@ -83,9 +81,9 @@ impl Truth {
                     (&self.hierarchies[cloud], settings.groups(&self.clouds[cloud]));
                 let done = |points| {
                     self.progress.advance(points);
-                    patience::go_on(cancel)
+                    go_on(cancel)
                 };
-                draw_cloud(&mut renderer, cloud, dataset, nodes, &groups, done)
+                full_resolution::draw(&mut renderer, cloud, dataset, nodes, &groups, done)
                     .with_context(|| text.clone())?;
             }
         }
@@ -155,48 +153,6 @@ fn open(text: &str) -> anyhow::Result<Dataset<Metered>> {
     let source = BlockingSource::new(Source::parse(text)?)?;
     let source = Metered { source, requests: AtomicU64::new(0), bytes: AtomicU64::new(0) };
     Dataset::open(source).with_context(|| text.to_owned())
-}
-
-/// The nodes that hold every point once, in the order in which frames draw, so that equally near
-/// points are resolved alike.
-fn full_resolution(dataset: &Dataset<Metered>) -> anyhow::Result<Vec<Node>> {
-    let mut nodes = dataset.hierarchy()?;
-    if dataset.manifest().refinement == Refinement::Replace {
-        // The leaves are the full resolution; what is above stands in for them.
-        nodes.retain(Node::is_leaf);
-    }
-    nodes.sort_by_key(|node| node.key);
-    Ok(nodes)
-}
-
-fn draw_cloud(
-    renderer: &mut TruthRenderer,
-    cloud: usize,
-    dataset: &Dataset<Metered>,
-    nodes: &[Node],
-    groups: &[usize],
-    done: impl Fn(u64) -> anyhow::Result<()>,
-) -> anyhow::Result<()> {
-    let mut rest = nodes;
-    while !rest.is_empty() {
-        let mut points = 0;
-        let fits = |node: &&Node| {
-            points += u64::from(node.points);
-            points <= BATCH_POINTS
-        };
-        // One node at least, however large.
-        let count = rest.iter().take_while(fits).count().max(1);
-        let (batch, next) = rest.split_at(count);
-        rest = next;
-        let read = |node: &Node| dataset.read_node(node, groups);
-        let decoded = batch.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        for (node, points) in batch.iter().zip(decoded) {
-            done(points.positions.len() as u64)?;
-            let (key, spacing) = (node.key, node.spacing);
-            renderer.add_node(DrawNode { cloud, key, spacing, points: Arc::new(points) })?;
-        }
-    }
-    Ok(())
 }
 
 /// A source that counts what is read.

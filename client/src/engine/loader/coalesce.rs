@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::super::config::Coalesce;
+use crate::source::BatchLimits;
 
 /// A range that is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,11 +24,13 @@ impl Wanted {
     }
 }
 
-/// One request: the ranges that it brings, by offset and without overlap.
+/// One request: the ranges that it brings, by offset and without overlap; those of a batch by rank.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Run {
     /// Never empty.
     pub parts: Vec<Wanted>,
+    /// Whether it names its parts, instead of all from the first to the last.
+    pub is_batch: bool,
 }
 
 impl Run {
@@ -60,10 +63,38 @@ pub fn coalesce(mut wanted: Vec<Wanted>, limits: Coalesce) -> Vec<Run> {
         });
         match runs.last_mut() {
             Some(run) if fits => run.parts.push(part),
-            _ => runs.push(Run { parts: vec![part] }),
+            _ => runs.push(Run { parts: vec![part], is_batch: false }),
         }
     }
     runs.sort_by_key(Run::rank);
+    runs
+}
+
+/// Puts what matters most into one request, then what matters next into another, each of a span's bytes
+/// at most; a single range may be longer.
+/// Every range is in exactly one run; runs come most important first.
+pub fn batch(wanted: Vec<Wanted>, limits: BatchLimits, span_bytes: u64) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    let mut bytes = 0;
+    for part in wanted {
+        bytes += part.len;
+        match runs.last_mut() {
+            Some(run)
+                if bytes <= span_bytes.min(limits.bytes)
+                    && run.parts.len() < limits.parts
+                    && !part.alone
+                    && !run.parts[0].alone =>
+            {
+                run.parts.push(part);
+                run.is_batch = true;
+            }
+            _ => {
+                bytes = part.len;
+                // A part alone is a range like any other.
+                runs.push(Run { parts: vec![part], is_batch: false });
+            }
+        }
+    }
     runs
 }
 
@@ -100,6 +131,22 @@ mod tests {
         let mut parts = wanted(&[(0, 10), (10, 10), (20, 10)]);
         parts[1].alone = true;
         assert_eq!(spans(&coalesce(parts, LIMITS)), [0..10, 10..20, 20..30]);
+    }
+
+    #[test]
+    fn a_batch_takes_parts_by_rank_within_the_limits() {
+        let limits = BatchLimits { parts: 3, bytes: 1000 };
+        let ranks = |runs: &[Run]| -> Vec<(Vec<usize>, bool)> {
+            let ranks = |run: &Run| run.parts.iter().map(|part| part.rank).collect();
+            runs.iter().map(|run| (ranks(run), run.is_batch)).collect()
+        };
+        let parts = wanted(&[(900, 10), (0, 10), (500, 10), (5, 10), (300, 95), (200, 200)]);
+        let found = [(vec![0, 1, 2], true), (vec![3], false), (vec![4], false), (vec![5], false)];
+        assert_eq!(ranks(&batch(parts, limits, 100)), found);
+        let mut parts = wanted(&[(900, 10), (0, 10), (500, 10)]);
+        parts[1].alone = true;
+        let apart = [(vec![0], false), (vec![1], false), (vec![2], false)];
+        assert_eq!(ranks(&batch(parts, limits, 100)), apart);
     }
 
     proptest! {

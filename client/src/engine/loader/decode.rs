@@ -1,4 +1,4 @@
-//! From bytes to nodes, on the rayon pool.
+//! From bytes to nodes.
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},

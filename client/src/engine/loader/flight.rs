@@ -9,6 +9,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use lodestream_protocol::BatchPart;
 use tokio::{sync::mpsc::UnboundedSender, task::AbortHandle, time::Instant};
 
 use crate::source::{Fault, Source, SourceError};
@@ -51,28 +52,30 @@ struct Progress {
 }
 
 impl Flight {
-    /// Sends a request for `pieces`, which lie in order and do not overlap, on the current runtime.
+    /// Sends a request for `pieces` on the current runtime: a batch, or the range from the first to the
+    /// last, which then lie in order and do not overlap.
     /// What arrives goes to `messages`; the last message is always [`Message::Finished`]. What the host
     /// delivers counts in `delivered`; when that reaches what was waited for, it is told too.
     pub fn start(
         id: FlightId,
         source: Source,
         pieces: Vec<Piece>,
+        is_batch: bool,
         shared: Arc<Shared>,
         messages: UnboundedSender<Message>,
         delivered: Arc<Delivered>,
     ) -> Self {
         let cloud = pieces.first().map_or(0, |piece| piece.id.node.cloud);
-        let start = pieces.first().map_or(0, |piece| piece.offset);
-        let len = pieces.last().map_or(start, Piece::end) - start;
+        let ask = if is_batch { Ask::parts(&pieces) } else { Ask::range(&pieces) };
+        let len = ask.len();
         let progress = Arc::new(Progress::default());
-        let mut cutter = Cutter::new(pieces.iter().map(|piece| (piece.offset, piece.len)));
+        let mut cutter = ask.cutter(&pieces);
         let counted = Arc::clone(&progress);
         let task = tokio::spawn(async move {
             let mut end = End { id, messages, result: None };
             shared.counters.requests.add(1);
-            let result = source
-                .stream_range(start, len, &mut |bytes: Bytes| {
+            let result = ask
+                .stream(&source, &mut |bytes: Bytes| {
                     let count = bytes.len() as u64;
                     shared.counters.bytes.add(count);
                     counted.bytes.fetch_add(count, Ordering::Relaxed);
@@ -107,6 +110,11 @@ impl Flight {
         self.len.saturating_sub(self.progress.bytes.load(Ordering::Relaxed))
     }
 
+    /// Bytes between its pieces.
+    pub fn gap_bytes(&self) -> u64 {
+        self.len.saturating_sub(self.pieces.iter().map(|piece| piece.len).sum())
+    }
+
     /// How long the first byte took; and since then, what the host delivered for all requests, of
     /// `delivered` ever, in what time. `None` where nothing has come.
     pub fn measured(&self, delivered: u64) -> Option<(Duration, u64, Duration)> {
@@ -124,6 +132,58 @@ impl Flight {
 impl Drop for Flight {
     fn drop(&mut self) {
         self.abort();
+    }
+}
+
+/// What a request asks for.
+#[derive(Debug)]
+enum Ask {
+    Range { start: u64, len: u64 },
+    Parts(Vec<BatchPart>),
+}
+
+impl Ask {
+    fn range(pieces: &[Piece]) -> Self {
+        let start = pieces.first().map_or(0, |piece| piece.offset);
+        Self::Range { start, len: pieces.last().map_or(start, Piece::end) - start }
+    }
+
+    fn parts(pieces: &[Piece]) -> Self {
+        // Lengths are 32-bit numbers in the tree.
+        let bytes = |piece: &Piece| u32::try_from(piece.len).unwrap_or(u32::MAX);
+        let part = |piece: &Piece| BatchPart { offset: piece.offset, bytes: bytes(piece) };
+        Self::Parts(pieces.iter().map(part).collect())
+    }
+
+    fn len(&self) -> u64 {
+        match self {
+            Self::Range { len, .. } => *len,
+            Self::Parts(parts) => parts.iter().map(|part| u64::from(part.bytes)).sum(),
+        }
+    }
+
+    /// Cuts what comes into the pieces.
+    fn cutter(&self, pieces: &[Piece]) -> Cutter {
+        let mut end = 0;
+        Cutter::new(pieces.iter().map(|piece| match self {
+            Self::Range { .. } => (piece.offset, piece.len),
+            // They come back to back.
+            Self::Parts(_) => {
+                end += piece.len;
+                (end - piece.len, piece.len)
+            }
+        }))
+    }
+
+    async fn stream(
+        &self,
+        source: &Source,
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<(), SourceError> {
+        match self {
+            Self::Range { start, len } => source.stream_range(*start, *len, sink).await,
+            Self::Parts(parts) => source.stream_parts(parts, sink).await,
+        }
     }
 }
 

@@ -1,40 +1,46 @@
 //! The loader thread: turns demands into requests, and answers into events.
 //!
-//! Owned by the engine; owns an async runtime of one thread, which all requests run on; decoding
-//! goes to the rayon pool. A demand replaces the one before: what is no longer wanted is forgotten
+//! Owned by the engine; owns an async runtime of one thread, which all requests run on, and the threads that
+//! decode. A demand replaces the one before: what is no longer wanted is forgotten
 //! if it was queued, and broken off if it was in flight and not nearly done. Failures of a host
-//! pause that host, failures of a piece pause that piece; neither ends anything.
+//! pause that host, failures of a piece pause that piece; neither ends anything. What ends a cloud ends
+//! that cloud alone, until it can be opened again (`openings.rs`).
 
+mod cloud;
 mod coalesce;
 mod cutter;
 mod decode;
 mod flight;
 mod open;
+mod openings;
 mod pace;
 mod pieces;
 
 use std::{
-    collections::{HashMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
     sync::{Arc, atomic::Ordering},
 };
 
 use bytes::Bytes;
-use lodestream_protocol::{Boot, Error};
+use lodestream_protocol::Error;
 use tokio::{
-    sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel},
-    task::JoinSet,
+    sync::{
+        Semaphore,
+        mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel},
+    },
     // Its clock can be a simulated one.
     time::Instant,
 };
 
-use crate::source::{Backoff, Source, SourceError};
+use crate::source::{Backoff, Connections, Source, SourceError};
 
 use self::{
-    coalesce::Wanted,
+    cloud::Cloud,
+    coalesce::{Run, Wanted},
     decode::Decoded,
-    flight::{Delivered, Flight, FlightId},
+    flight::{Flight, FlightId},
     open::Opening,
-    pace::Pace,
+    openings::{OpeningId, OpeningTask},
     pieces::{PieceState, Pieces},
 };
 use super::{
@@ -55,15 +61,20 @@ const MAX_DAMAGED: u32 = 3;
 /// What the loader's tasks tell it. At most one message per piece and request is ever waiting.
 #[derive(Debug)]
 enum Message {
-    /// More of a cloud's first bytes has come.
+    /// More of a cloud's first bytes has come, from that source.
     Opening {
-        cloud: usize,
+        id: OpeningId,
+        source: Source,
         opening: Opening,
     },
-    /// A cloud can never be opened.
+    /// A cloud cannot be opened.
     Unopened {
-        cloud: usize,
+        id: OpeningId,
         message: String,
+    },
+    /// Nothing more comes of an opening.
+    Ended {
+        id: OpeningId,
     },
     /// The piece with that index among the flight's.
     Arrived {
@@ -83,45 +94,30 @@ enum Message {
     },
 }
 
-/// What the loader knows of a cloud.
-#[derive(Debug)]
-struct Cloud {
-    source: Source,
-    boot: Option<Arc<Boot>>,
-    /// The first bytes of the file, and how many of them will come in all.
-    prefix: Bytes,
-    prefix_end: u64,
-    /// Bytes of payloads and pages that have come.
-    delivered: Arc<Delivered>,
-    pace: Pace,
-    /// Failed requests in a row.
-    failures: u32,
-    /// No request before then.
-    not_before: Option<Instant>,
-    failed: bool,
-}
-
-impl Cloud {
-    /// Bytes of the prefix that are still to come.
-    fn prefix_left(&self) -> u64 {
-        self.prefix_end.saturating_sub(self.prefix.len() as u64)
-    }
-}
-
 /// The thread's state.
 pub(super) struct Loader {
     shared: Arc<Shared>,
     config: EngineConfig,
-    clouds: Vec<Cloud>,
+    /// By index. Those that were removed are not there, and neither is one that another version stands
+    /// in the place of.
+    clouds: BTreeMap<usize, Cloud>,
+    openings: HashMap<OpeningId, OpeningTask>,
+    next_opening: OpeningId,
     demand: Vec<Piece>,
+    /// The pieces of the demand.
+    wanted: HashSet<PieceId>,
     /// When each wanted piece was first wanted, where pieces are loaded in that order.
     turns: HashMap<PieceId, u64>,
     next_turn: u64,
     pieces: Pieces,
     flights: HashMap<FlightId, Flight>,
     next_flight: FlightId,
-    /// Decode at once, on this thread: simulated time must not pass meanwhile.
-    decode_inline: bool,
+    /// Where decoding goes; where there are none, it is done at once, on this thread: simulated time must not
+    /// pass meanwhile.
+    decoders: Option<rayon::ThreadPool>,
+    connections: Connections,
+    /// Who asks a host for first bytes passes its gate; `None` is for files.
+    gates: HashMap<Option<String>, Arc<Semaphore>>,
     /// Where other engines may have the same index.
     commons: Option<Arc<Commons>>,
     sender: UnboundedSender<Message>,
@@ -129,39 +125,43 @@ pub(super) struct Loader {
 }
 
 impl Loader {
-    pub fn new(shared: Arc<Shared>, config: EngineConfig, sources: Vec<Source>) -> Self {
+    pub fn new(shared: Arc<Shared>, config: EngineConfig) -> Self {
         let (sender, receiver) = unbounded_channel();
-        let clouds = sources.into_iter().map(|source| Cloud {
-            source,
-            boot: None,
-            prefix: Bytes::new(),
-            prefix_end: 0,
-            delivered: Arc::default(),
-            pace: Pace::default(),
-            failures: 0,
-            not_before: None,
-            failed: false,
-        });
         Self {
             shared,
             config,
-            clouds: clouds.collect(),
+            clouds: BTreeMap::new(),
+            openings: HashMap::new(),
+            next_opening: 0,
             demand: Vec::new(),
+            wanted: HashSet::new(),
             turns: HashMap::new(),
             next_turn: 0,
             pieces: Pieces::default(),
             flights: HashMap::new(),
             next_flight: 0,
-            decode_inline: false,
+            decoders: None,
+            connections: Connections::default(),
+            gates: HashMap::new(),
             commons: None,
             sender,
             receiver,
         }
     }
 
-    /// The same, decoding on its own thread.
-    pub fn decoding_inline(self) -> Self {
-        Self { decode_inline: true, ..self }
+    /// The same, with threads that decode: not those that a renderer may use, behind whose backs what it
+    /// asks for would wait for all that has come. One processor is left for who draws.
+    ///
+    /// # Errors
+    /// Where the system gives no thread.
+    pub fn with_decoders(self) -> std::io::Result<Self> {
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let decoders = rayon::ThreadPoolBuilder::new()
+            .num_threads(processors.saturating_sub(1).max(1))
+            .thread_name(|index| format!("decoder {index}"))
+            .build()
+            .map_err(std::io::Error::other)?;
+        Ok(Self { decoders: Some(decoders), ..self })
     }
 
     /// The same, keeping what is equal in other engines once.
@@ -171,21 +171,6 @@ impl Loader {
 
     /// Runs until the inbox says to end.
     pub async fn run(mut self) {
-        // Broken off when they are dropped, as flights are.
-        let mut openings = JoinSet::new();
-        for cloud in 0..self.clouds.len() {
-            let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
-            let source = self.clouds[cloud].source.clone();
-            let speculative = self.config.speculative_bytes;
-            openings.spawn(async move {
-                // The loader outlives its tasks, save when it shuts down.
-                let tell = |opening| _ = sender.send(Message::Opening { cloud, opening });
-                let result = open::open(&shared, cloud, &source, speculative, tell).await;
-                if let Err(message) = result {
-                    let _ = sender.send(Message::Unopened { cloud, message });
-                }
-            });
-        }
         loop {
             let shared = Arc::clone(&self.shared);
             let retry = self.next_retry();
@@ -196,6 +181,7 @@ impl Loader {
                     if mail.shutdown {
                         return;
                     }
+                    mail.changes.into_iter().for_each(|change| self.change(change));
                     if let Some(demand) = mail.demand {
                         self.accept(demand);
                     }
@@ -214,15 +200,17 @@ impl Loader {
     /// A new demand replaces the old one.
     fn accept(&mut self, demand: Demand) {
         self.demand = demand.pieces;
-        let wanted: HashSet<_> = self.demand.iter().map(|piece| piece.id).collect();
-        self.pieces.update(&wanted, demand.seen);
+        // It may have been written before the traversal knew that a cloud is gone.
+        self.demand.retain(|piece| self.clouds.contains_key(&piece.id.node.cloud));
+        self.wanted = self.demand.iter().map(|piece| piece.id).collect();
+        self.pieces.update(&self.wanted, demand.seen);
         if self.config.order == LoadOrder::Arrival {
-            self.take_turns(&wanted);
+            self.take_turns();
         }
         if !self.config.cancels {
             return;
         }
-        let pieces = &self.pieces;
+        let (pieces, wanted) = (&self.pieces, &self.wanted);
         let stale = self.flights.extract_if(|id, flight| {
             let mut open = flight.pieces.iter().filter(|piece| pieces.is_loading(piece.id, *id));
             !open.any(|piece| wanted.contains(&piece.id)) && !flight.is_nearly_done()
@@ -235,8 +223,8 @@ impl Loader {
     }
 
     /// Puts the demand into the order in which its pieces were first wanted.
-    fn take_turns(&mut self, wanted: &HashSet<PieceId>) {
-        self.turns.retain(|id, _| wanted.contains(id));
+    fn take_turns(&mut self) {
+        self.turns.retain(|id, _| self.wanted.contains(id));
         for piece in &self.demand {
             self.turns.entry(piece.id).or_insert_with(|| {
                 self.next_turn += 1;
@@ -257,12 +245,16 @@ impl Loader {
 
     fn handle(&mut self, message: Message) {
         match message {
-            Message::Opening { cloud, opening } => self.take_opening(cloud, opening),
-            Message::Unopened { cloud, message } => self.fail_cloud(cloud, message),
+            Message::Opening { id, source, opening } => self.take_opening(id, source, opening),
+            Message::Unopened { id, message } => self.fail_opening(id, message),
+            Message::Ended { id } => self.end_opening(id),
             Message::Arrived { flight, index, bytes } => {
                 let Some(flight_) = self.flights.get(&flight) else { return };
                 let piece = flight_.pieces[index].clone();
                 if self.pieces.is_loading(piece.id, flight) {
+                    if self.wanted.contains(&piece.id) {
+                        self.shared.counters.useful_bytes.add(piece.len);
+                    }
                     self.start_decoding(piece, bytes);
                 }
             }
@@ -278,26 +270,9 @@ impl Loader {
         }
     }
 
-    fn take_opening(&mut self, cloud: usize, opening: Opening) {
-        let known = &mut self.clouds[cloud];
-        let is_whole = opening.prefix.len() as u64 >= opening.expected;
-        known.prefix = match &self.commons {
-            Some(commons) if is_whole => commons.prefix(&opening.boot, opening.prefix),
-            _ => opening.prefix,
-        };
-        known.prefix_end = opening.expected;
-        if known.boot.is_none() {
-            let boot = match &self.commons {
-                Some(commons) => commons.boot(opening.boot),
-                None => opening.boot,
-            };
-            known.boot = Some(Arc::clone(&boot));
-            self.shared.traversal.post(Event::Opened { cloud, boot });
-        }
-    }
-
     fn start_decoding(&mut self, piece: Piece, bytes: Bytes) {
-        let Some(boot) = self.clouds[piece.id.node.cloud].boot.clone() else { return };
+        let boot = self.clouds.get(&piece.id.node.cloud).and_then(|cloud| cloud.boot.clone());
+        let Some(boot) = boot else { return };
         let size = decode::decoded_bytes(&piece, &boot.manifest);
         self.pieces.set(piece.id, PieceState::Decoding { bytes: size });
         if piece.id.part == Part::Page {
@@ -310,10 +285,9 @@ impl Loader {
             shared.counters.decode_nanos.add(nanos);
             let _ = sender.send(Message::Decoded { piece: piece.id, result });
         };
-        if self.decode_inline {
-            work();
-        } else {
-            rayon::spawn(work);
+        match &self.decoders {
+            Some(decoders) => decoders.spawn(work),
+            None => work(),
         }
     }
 
@@ -321,7 +295,7 @@ impl Loader {
         if !matches!(self.pieces.get(id), Some(PieceState::Decoding { .. })) {
             return;
         }
-        let cloud = &mut self.clouds[id.node.cloud];
+        let Some(cloud) = self.clouds.get_mut(&id.node.cloud) else { return };
         let event = match result {
             Ok(decoded) => {
                 self.shared.counters.decoded_nodes.add(1);
@@ -357,28 +331,30 @@ impl Loader {
 
     /// A request has ended, well or not.
     fn finish(&mut self, id: FlightId, flight: &Flight, result: Result<(), SourceError>) {
-        let cloud = &mut self.clouds[flight.cloud];
+        let Some(cloud) = self.clouds.get_mut(&flight.cloud) else { return };
         let error = match result {
             Ok(()) => {
                 let delivered = cloud.delivered.bytes.load(Ordering::Relaxed);
+                self.shared.counters.gap_bytes.add(flight.gap_bytes());
                 if let Some((wait, bytes, time)) = flight.measured(delivered) {
                     cloud.pace.note(wait, bytes, time);
                 }
                 cloud.not_before = None;
+                cloud.doubts = 0;
                 if std::mem::take(&mut cloud.failures) > 0 {
-                    self.shared.board.post(|news| news.clouds[flight.cloud].trouble = None);
+                    self.shared.trouble(Some(cloud.number), None);
                 }
                 return;
             }
             Err(error) => error,
         };
         if !error.is_transient() {
-            self.fail_cloud(flight.cloud, error.to_string());
             self.break_off(id, flight);
+            self.give_up(flight.cloud, &error);
             return;
         }
         self.shared.counters.retries.add(1);
-        self.shared.board.post(|news| news.clouds[flight.cloud].trouble = Some(error.to_string()));
+        self.shared.trouble(Some(cloud.number), Some(error.to_string()));
         cloud.failures = cloud.failures.saturating_add(1);
         cloud.not_before = Some(Instant::now() + Backoff::default().delay(cloud.failures));
         let missing = flight.pieces.iter().filter(|piece| self.pieces.is_loading(piece.id, id));
@@ -395,26 +371,14 @@ impl Loader {
         }
     }
 
-    /// Nothing more can be had from that cloud.
-    fn fail_cloud(&mut self, cloud: usize, message: String) {
-        if std::mem::replace(&mut self.clouds[cloud].failed, true) {
-            return;
-        }
-        let flights: Vec<_> = self.flights.extract_if(|_, f| f.cloud == cloud).collect();
-        for (id, flight) in flights {
-            self.break_off(id, &flight);
-        }
-        self.shared.traversal.post(Event::CloudFailed { cloud, message });
-    }
-
     /// Starts what may be started.
     fn dispatch(&mut self) {
         let now = Instant::now();
         self.take_from_prefixes(now);
         let free = self.config.requests_in_flight.max(1).saturating_sub(self.flights.len());
         if free > 0 && self.pieces.backlog_bytes() <= MAX_BACKLOG_BYTES {
-            for run in self.runs(now).into_iter().take(free) {
-                self.start_flight(run);
+            for (pieces, is_batch) in self.runs(now).into_iter().take(free) {
+                self.start_flight(pieces, is_batch);
             }
             if self.config.paces {
                 self.wait_for_turns();
@@ -429,7 +393,7 @@ impl Loader {
     fn take_from_prefixes(&mut self, now: Instant) {
         let mut found = Vec::new();
         for piece in &self.demand {
-            let cloud = &self.clouds[piece.id.node.cloud];
+            let Some(cloud) = self.clouds.get(&piece.id.node.cloud) else { continue };
             let here = if piece.len == 0 {
                 Some(Bytes::new())
             } else {
@@ -440,75 +404,93 @@ impl Loader {
                     .map(|(start, end)| cloud.prefix.slice(start..end))
             };
             if let Some(bytes) = here
-                && !cloud.failed
+                && !cloud.is_in_doubt
                 && self.pieces.is_free(piece.id, now)
             {
                 found.push((piece.clone(), bytes));
             }
         }
         for (piece, bytes) in found {
+            let cloud = self.clouds.get_mut(&piece.id.node.cloud);
+            if cloud.is_some_and(|cloud| cloud.prefix_used.insert(piece.id)) {
+                self.shared.counters.useful_bytes.add(piece.len);
+            }
             self.start_decoding(piece, bytes);
         }
     }
 
-    /// The requests that the demand comes to, most important first.
-    fn runs(&self, now: Instant) -> Vec<Vec<Piece>> {
-        let mut wanted: Vec<Vec<Wanted>> = vec![Vec::new(); self.clouds.len()];
+    /// The requests that the demand comes to, most important first: their pieces, and whether they name
+    /// each.
+    fn runs(&self, now: Instant) -> Vec<(Vec<Piece>, bool)> {
+        let mut wanted: BTreeMap<usize, Vec<Wanted>> = BTreeMap::new();
         // What matters less does not ride along while what matters more waits.
-        let clouds = 0..self.clouds.len();
-        let mut allowed: Vec<_> = clouds.map(|cloud| self.allowance(cloud)).collect();
+        let mut allowed: HashMap<usize, u64> = HashMap::new();
         for (rank, piece) in self.demand.iter().enumerate() {
-            let cloud = &self.clouds[piece.id.node.cloud];
+            let index = piece.id.node.cloud;
+            let Some(cloud) = self.clouds.get(&index) else { continue };
             let paused = cloud.not_before.is_some_and(|until| until > now);
             let on_its_way = piece.end() <= cloud.prefix_end;
-            if !paused && !cloud.failed && !on_its_way && self.pieces.is_free(piece.id, now) {
+            if !paused && !cloud.is_in_doubt && !on_its_way && self.pieces.is_free(piece.id, now) {
                 // The last may be longer: one piece at least.
-                let allowed = &mut allowed[piece.id.node.cloud];
+                let allowed = allowed.entry(index).or_insert_with(|| self.allowance(index, cloud));
                 if *allowed == 0 {
                     continue;
                 }
                 *allowed = allowed.saturating_sub(piece.len);
                 let alone = self.pieces.needs_own_request(piece.id);
-                let wanted = &mut wanted[piece.id.node.cloud];
+                let wanted = wanted.entry(index).or_default();
                 wanted.push(Wanted { rank, offset: piece.offset, len: piece.len, alone });
             }
         }
-        let coalesced =
-            wanted.into_iter().flat_map(|w| coalesce::coalesce(w, self.config.coalesce));
-        let mut runs: Vec<_> = coalesced.collect();
-        runs.sort_by_key(|run| run.rank());
-        let pieces = runs
-            .iter()
-            .map(|run| run.parts.iter().map(|part| self.demand[part.rank].clone()).collect());
-        pieces.collect()
+        let mut runs: Vec<_> = wanted
+            .into_iter()
+            .flat_map(|(index, wanted)| {
+                let source = self.clouds.get(&index).map(|cloud| &cloud.source);
+                let limits = source.and_then(Source::batch_limits);
+                match limits.filter(|_| self.config.batches) {
+                    Some(limits) => {
+                        coalesce::batch(wanted, limits, self.config.coalesce.span_bytes)
+                    }
+                    None => coalesce::coalesce(wanted, self.config.coalesce),
+                }
+            })
+            .collect();
+        runs.sort_by_key(Run::rank);
+        let pieces = |run: &Run| {
+            let pieces = run.parts.iter().map(|part| self.demand[part.rank].clone());
+            (pieces.collect(), run.is_batch)
+        };
+        runs.iter().map(pieces).collect()
+    }
+
+    /// Bytes that a cloud's requests in flight have still to bring.
+    fn left_bytes(&self, cloud: usize) -> u64 {
+        let flights = self.flights.values().filter(|flight| flight.cloud == cloud);
+        flights.map(Flight::left_bytes).sum()
     }
 
     /// Bytes that may be asked for of a cloud: none while those in flight keep its link busy.
-    fn allowance(&self, cloud: usize) -> u64 {
+    fn allowance(&self, index: usize, cloud: &Cloud) -> u64 {
         if !self.config.paces {
             return u64::MAX;
         }
-        let flights = self.flights.values().filter(|flight| flight.cloud == cloud);
-        let left: u64 = flights.map(Flight::left_bytes).sum();
-        let left = left + self.clouds[cloud].prefix_left();
-        let limit = self.clouds[cloud].pace.limit_bytes();
+        let left = self.left_bytes(index) + cloud.prefix_left();
+        let limit = cloud.pace.limit_bytes();
         if left > limit { 0 } else { 2 * limit - left }
     }
 
     /// Has it told when more may be asked for.
     fn wait_for_turns(&self) {
-        for (index, cloud) in self.clouds.iter().enumerate() {
-            let flights = self.flights.values().filter(|flight| flight.cloud == index);
-            let left: u64 = flights.map(Flight::left_bytes).sum();
-            let turn = left.saturating_sub(cloud.pace.limit_bytes());
+        for (index, cloud) in &self.clouds {
+            let turn = self.left_bytes(*index).saturating_sub(cloud.pace.limit_bytes());
             let delivered = cloud.delivered.bytes.load(Ordering::Relaxed);
             cloud.delivered.waited_for.store(delivered + turn, Ordering::Relaxed);
         }
     }
 
-    fn start_flight(&mut self, pieces: Vec<Piece>) {
+    fn start_flight(&mut self, pieces: Vec<Piece>, is_batch: bool) {
         let Some(first) = pieces.first() else { return };
-        let cloud = &self.clouds[first.id.node.cloud];
+        let Some(cloud) = self.clouds.get(&first.id.node.cloud) else { return };
         let (source, delivered) = (cloud.source.clone(), Arc::clone(&cloud.delivered));
         let id = self.next_flight;
         self.next_flight += 1;
@@ -517,7 +499,7 @@ impl Loader {
         }
         let shared = Arc::clone(&self.shared);
         let sender = self.sender.clone();
-        let flight = Flight::start(id, source, pieces, shared, sender, delivered);
+        let flight = Flight::start(id, source, pieces, is_batch, shared, sender, delivered);
         self.flights.insert(id, flight);
     }
 
@@ -526,7 +508,7 @@ impl Loader {
         let now = Instant::now();
         let pieces = self.demand.iter().filter_map(|piece| self.pieces.retry_at(piece.id));
         let wanted: HashSet<_> = self.demand.iter().map(|piece| piece.id.node.cloud).collect();
-        let clouds = wanted.into_iter().filter_map(|cloud| self.clouds[cloud].not_before);
+        let clouds = wanted.into_iter().filter_map(|cloud| self.clouds.get(&cloud)?.not_before);
         // What is past waits for a free request, not for the clock.
         clouds.chain(pieces).filter(|&at| at > now).min()
     }

@@ -7,10 +7,11 @@ use std::sync::Arc;
 
 use bytes::{Bytes, BytesMut};
 use lodestream_protocol::{Boot, Error, HEADER_BYTES, Header};
+use tokio::sync::Semaphore;
 
 use crate::source::{Announced, Backoff, Source, SourceError};
 
-use super::super::shared::Shared;
+use super::super::{commons::Commons, shared::Shared};
 
 /// What there is of a cloud's first bytes.
 #[derive(Debug)]
@@ -23,39 +24,65 @@ pub struct Opening {
     pub expected: u64,
 }
 
-/// Opens `source`, trying again for as long as that may help; asks for `speculative` bytes at first.
-/// Whenever more of them has come, it is told.
+impl Opening {
+    /// The same, keeping what is equal in other engines once.
+    pub fn shared(self, commons: &Commons) -> Self {
+        let boot = commons.boot(self.boot);
+        let is_whole = self.prefix.len() as u64 >= self.expected;
+        let prefix = if is_whole { commons.prefix(&boot, self.prefix) } else { self.prefix };
+        Self { boot, prefix, ..self }
+    }
+}
+
+/// How a cloud is opened.
+#[derive(Debug)]
+pub struct Ask<'a> {
+    /// The cloud's, for the caller.
+    pub number: usize,
+    /// Bytes that are asked for at first.
+    pub speculative: u64,
+    /// To be passed before the host is asked.
+    pub gate: &'a Semaphore,
+}
+
+/// Opens `source`, trying again for as long as that may help. Whenever more of the first bytes has come,
+/// it is told, and which source they are of: where the file is replaced meanwhile, that is another one.
 ///
 /// # Errors
 /// What is wrong for good, with the source's name.
 pub async fn open(
     shared: &Shared,
-    cloud: usize,
-    source: &Source,
-    speculative: u64,
-    tell: impl Fn(Opening) + Send + Sync,
+    ask: Ask<'_>,
+    mut source: Source,
+    tell: impl Fn(&Source, Opening) + Send + Sync,
 ) -> Result<(), String> {
     let mut failures = 0;
     loop {
         let mut reader = Reader { boot: None, bytes: BytesMut::new(), announced: None };
-        match reader.read(shared, source, speculative, &tell).await {
+        let told = |opening| tell(&source, opening);
+        // Closed never; and who waits for another try keeps nobody from his first.
+        let passed = ask.gate.acquire().await;
+        let result = reader.read(shared, &source, ask.speculative, &told).await;
+        drop(passed);
+        let error = match result {
             Ok(()) => {
-                shared.board.post(|news| news.clouds[cloud].trouble = None);
+                shared.trouble(Some(ask.number), None);
                 return Ok(());
             }
-            Err(Failure::Source(error)) if error.is_transient() => {
-                // What has come is good; the rest is asked for as everything else is.
-                if reader.end(&tell) {
-                    return Ok(());
-                }
-                failures += 1;
-                shared.counters.retries.add(1);
-                shared.board.post(|news| news.clouds[cloud].trouble = Some(error.to_string()));
-                tokio::time::sleep(Backoff::default().delay(failures)).await;
-            }
-            Err(Failure::Source(error)) => return Err(error.to_string()),
             Err(Failure::Format(error)) => return Err(format!("{}: {error}", source.describe())),
+            Err(Failure::Source(error)) => error,
+        };
+        match error {
+            // What has come is good; the rest is asked for as everything else is.
+            SourceError::Transient { .. } if reader.end(&told) => return Ok(()),
+            SourceError::Transient { .. } => {}
+            SourceError::Replaced { .. } => source = source.renew().map_err(|e| e.to_string())?,
+            SourceError::Permanent { .. } => return Err(error.to_string()),
         }
+        failures += 1;
+        shared.counters.retries.add(1);
+        shared.trouble(Some(ask.number), Some(error.to_string()));
+        tokio::time::sleep(Backoff::default().delay(failures)).await;
     }
 }
 

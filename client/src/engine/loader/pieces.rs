@@ -98,6 +98,12 @@ impl Pieces {
         self.failures.get(&id).is_some_and(|failures| failures.broken >= ALONE_AFTER)
     }
 
+    /// Forgets all of a cloud.
+    pub fn forget(&mut self, cloud: usize) {
+        self.failures.retain(|id, _| id.node.cloud != cloud);
+        self.states.retain(|id, _| id.node.cloud != cloud);
+    }
+
     /// A new demand: forgets what the traversal has read and failures of what is not wanted.
     pub fn update(&mut self, wanted: &HashSet<PieceId>, seen: u64) {
         self.failures.retain(|id, _| wanted.contains(id));

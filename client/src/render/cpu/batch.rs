@@ -96,7 +96,7 @@ mod tests {
         let counts = [0, 1, 0, 3000, 5, 1024, 0, 0, 7, 0];
         let node = |count| {
             let key = NodeKey::ROOT;
-            let points = NodePoints { key, positions: vec![[0; 3]; count], columns: Vec::new() };
+            let points = NodePoints { positions: vec![[0; 3]; count], ..NodePoints::new(key) };
             DrawNode { cloud: 0, key, spacing: 1.0, points: Arc::new(points) }
         };
         let nodes = counts.map(node);

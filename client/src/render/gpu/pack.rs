@@ -256,7 +256,7 @@ mod tests {
                 .into_iter()
                 .map(|q| std::array::from_fn(|a| q[a] >> (shifts[a] % 32)))
                 .collect();
-            let points = NodePoints { key: NodeKey::ROOT, positions, columns: Vec::new() };
+            let points = NodePoints { positions, ..NodePoints::new(NodeKey::ROOT) };
             let surface = NodeSurface::default();
             let layout = RecordLayout::of(&points, RGB, &surface);
             let words = pack(&points, &layout, &NodeColor::Constant(color), &surface);
@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn a_terrain_node_with_colour_takes_seven_bytes_a_point() {
         let positions = (0..512).map(|i| [i * 8, 4095 - i * 8, 1000 + i / 2]).collect();
-        let points = NodePoints { key: NodeKey::ROOT, positions, columns: Vec::new() };
+        let points = NodePoints { positions, ..NodePoints::new(NodeKey::ROOT) };
         let surface = NodeSurface::default();
         let layout = RecordLayout::of(&points, RGB, &surface);
         let words = pack(&points, &layout, &NodeColor::Constant([0; 3]), &surface);

@@ -54,6 +54,8 @@ struct Key {
     /// Address of the manifest: what a cloud is known by as long as anything of it is here.
     cloud: usize,
     node: NodeKey,
+    /// How exactly its points are placed.
+    cell_bits: u8,
     fields: RecordFields,
 }
 
@@ -131,7 +133,12 @@ impl Pool {
         colors: &NodeColor,
         surface: &NodeSurface,
     ) -> Option<&Resident> {
-        let key = Key { cloud: Arc::as_ptr(cloud).addr(), node: points.key, fields };
+        let key = Key {
+            cloud: Arc::as_ptr(cloud).addr(),
+            node: points.key,
+            cell_bits: points.cell_bits,
+            fields,
+        };
         if !self.nodes.contains(&key) {
             if self.uploaded_bytes >= self.upload_bytes_per_frame {
                 return None;

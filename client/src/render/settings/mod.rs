@@ -95,6 +95,13 @@ impl RenderSettings {
         attributes
     }
 
+    /// Their names.
+    #[must_use]
+    pub fn attribute_names(&self, cloud: &Manifest) -> Vec<String> {
+        let attributes = self.attributes(cloud).into_iter();
+        attributes.map(|index| cloud.attributes[index].name.clone()).collect()
+    }
+
     /// Column groups of a cloud beyond the first that its picture needs.
     #[must_use]
     pub fn groups(&self, cloud: &Manifest) -> Vec<usize> {

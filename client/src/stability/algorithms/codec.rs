@@ -170,6 +170,7 @@ fn manifest(side_bits: u8, attributes: Vec<Attribute>) -> Manifest {
         largest_rounding: 0.0,
         groups: vec![GroupInfo { name: "base".into(), columns: vec![0; 1 + attributes.len()] }],
         attributes,
+        fine: None,
         crs: None,
         sources: Vec::new(),
     }

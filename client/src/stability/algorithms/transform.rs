@@ -237,7 +237,7 @@ fn extreme_picture(case: &'static str, size_px: [u32; 2]) -> Result<Row, Stabili
 
 /// The one point of a cloud.
 fn point_of(cloud: usize) -> DrawNode {
-    let points = NodePoints { key: NodeKey::ROOT, positions: vec![[0; 3]], columns: Vec::new() };
+    let points = NodePoints { positions: vec![[0; 3]], ..NodePoints::new(NodeKey::ROOT) };
     DrawNode { cloud, key: NodeKey::ROOT, spacing: 1.0, points: Arc::new(points) }
 }
 
@@ -255,6 +255,7 @@ fn manifest(lattice: Lattice) -> Manifest {
         largest_rounding: 0.0,
         attributes: Vec::new(),
         groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
+        fine: None,
         crs: None,
         sources: Vec::new(),
     }

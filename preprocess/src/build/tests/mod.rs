@@ -69,6 +69,7 @@ fn config(folder: &Path, points: &[[i64; 3]], threads: usize, memory_bytes: u64)
         drop_attributes: Vec::new(),
         columns: Some("x,y,z,number".into()),
         scale: None,
+        cells_per_spacing: CELLS_PER_SPACING,
         cancel: Arc::default(),
     }
 }

@@ -1,0 +1,147 @@
+//! Dataset files that are kept open between requests.
+//!
+//! To open a file, to read its header and to close it again takes half of the time that a small
+//! range takes. So files stay open, and a request only asks the system whether the name still leads
+//! to the same one: a dataset that is replaced, cut short or removed is so for the very next request.
+//! [`sweep`](OpenFiles::sweep) lets go of files that nobody asks for any more; until then, a removed
+//! one still takes its disk space.
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+    sync::{Arc, PoisonError, RwLock},
+    time::Duration,
+};
+
+use crate::file::{DatasetFile, Identity, OpenError, missing_or_unreadable};
+
+/// Files kept open: far fewer than a process may have.
+const MAX_OPEN: usize = 256;
+
+/// How often files are looked at that nobody asks for.
+pub(crate) const SWEEP_INTERVAL: Duration = Duration::from_secs(10);
+
+type Entry = (Identity, Arc<DatasetFile>);
+
+/// Open files by path.
+#[derive(Debug, Default)]
+pub(crate) struct OpenFiles {
+    files: RwLock<HashMap<PathBuf, Entry>>,
+}
+
+impl OpenFiles {
+    /// The file that the path leads to now (blocking).
+    pub(crate) fn open(&self, path: PathBuf) -> Result<Arc<DatasetFile>, OpenError> {
+        let identity = identity_of(&path);
+        {
+            let files = self.files.read().unwrap_or_else(PoisonError::into_inner);
+            if let (Some((known, file)), Ok(now)) = (files.get(&path), &identity)
+                && known == now
+            {
+                return Ok(Arc::clone(file));
+            }
+        }
+        let opened = identity.and_then(|_| DatasetFile::open(path.clone()));
+        let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
+        match opened {
+            Ok((identity, file)) => {
+                let file = Arc::new(file);
+                if files.len() >= MAX_OPEN && !files.contains_key(&path) {
+                    // Any of them: whoever has this many datasets in use opens them as before.
+                    let any = files.keys().next().cloned();
+                    any.and_then(|any| files.remove(&any));
+                }
+                files.insert(path, (identity, Arc::clone(&file)));
+                Ok(file)
+            }
+            Err(error) => {
+                files.remove(&path);
+                Err(error)
+            }
+        }
+    }
+
+    /// Closes files whose path leads elsewhere by now (blocking).
+    pub(crate) fn sweep(&self) {
+        let known: Vec<_> = {
+            let files = self.files.read().unwrap_or_else(PoisonError::into_inner);
+            files.iter().map(|(path, (identity, _))| (path.clone(), identity.clone())).collect()
+        };
+        for (path, identity) in known {
+            if identity_of(&path).as_ref() != Ok(&identity) {
+                let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
+                if files.get(&path).is_some_and(|(now, _)| *now == identity) {
+                    files.remove(&path);
+                }
+            }
+        }
+    }
+}
+
+fn identity_of(path: &Path) -> Result<Identity, OpenError> {
+    let metadata = path.metadata().map_err(missing_or_unreadable)?;
+    Ok(Identity::of(&metadata))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lodestream_protocol::Boot;
+
+    fn dataset() -> Vec<u8> {
+        let mut bytes = lodestream_protocol::Header {
+            version: (1, 0),
+            manifest_bytes: 0,
+            root_page_bytes: 0,
+            boot_bytes: 64,
+            file_bytes: 64,
+            content_id: [7; 16],
+            index_crc: 0,
+        }
+        .encode()
+        .to_vec();
+        // Not even its index is sound: that is for readers to see.
+        assert!(Boot::parse(&bytes).is_err());
+        bytes.extend_from_slice(b"more");
+        bytes
+    }
+
+    #[test]
+    fn a_file_is_opened_once_and_again_when_it_has_changed() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("a.lods");
+        let open_files = OpenFiles::default();
+        let open = || open_files.open(path.clone());
+        assert_eq!(open().err(), Some(OpenError::Missing));
+
+        std::fs::write(&path, dataset()).expect("writable");
+        let first = open().expect("a dataset");
+        assert!(Arc::ptr_eq(&first, &open().expect("a dataset")));
+
+        let other = folder.path().join("b");
+        std::fs::write(&other, dataset()).expect("writable");
+        std::fs::rename(&other, &path).expect("one folder");
+        let second = open().expect("a dataset");
+        assert!(!Arc::ptr_eq(&first, &second));
+
+        let file = std::fs::OpenOptions::new().write(true).open(&path).expect("writable");
+        file.set_len(63).expect("writable");
+        assert!(matches!(open(), Err(OpenError::Unreadable(_))));
+        std::fs::remove_file(&path).expect("it is there");
+        assert_eq!(open().err(), Some(OpenError::Missing));
+    }
+
+    #[test]
+    fn removed_files_are_let_go_of_without_being_asked_for() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("a.lods");
+        std::fs::write(&path, dataset()).expect("writable");
+        let open_files = OpenFiles::default();
+        let file = Arc::downgrade(&open_files.open(path.clone()).expect("a dataset"));
+        open_files.sweep();
+        assert!(file.upgrade().is_some());
+        std::fs::remove_file(&path).expect("it is there");
+        open_files.sweep();
+        assert!(file.upgrade().is_none());
+    }
+}

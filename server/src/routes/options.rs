@@ -1,0 +1,21 @@
+//! What may be asked of a resource.
+
+use axum::{
+    extract::Request,
+    http::{Method, StatusCode, header},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+
+/// Answers `OPTIONS` (RFC 9110, section 9.3.7), save a browser's question whether a page from elsewhere
+/// may ask, which the CORS layer behind answers. The answer is the same for all addresses, so that it
+/// tells nothing of what is there.
+pub(super) async fn options(request: Request, next: Next) -> Response {
+    let is_preflight = request.headers().contains_key(header::ACCESS_CONTROL_REQUEST_METHOD);
+    if request.method() != Method::OPTIONS || is_preflight {
+        return next.run(request).await;
+    }
+    let path = request.uri().path();
+    let allowed = if path.ends_with("/batch") { "POST, OPTIONS" } else { "GET, HEAD, OPTIONS" };
+    (StatusCode::NO_CONTENT, [(header::ALLOW, allowed)]).into_response()
+}

@@ -1,0 +1,118 @@
+//! Clients that are many, slow, or up to no good.
+
+use std::{
+    io::{Read, Write},
+    net::{SocketAddr, TcpStream},
+    sync::Arc,
+    time::Duration,
+};
+
+use lodestream_server::{RunningServer, ServeConfig, spawn};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+
+use crate::{
+    clients::{Client, Crowd},
+    file::dataset,
+};
+
+fn serve(
+    change: impl FnOnce(&mut ServeConfig),
+) -> (tempfile::TempDir, RunningServer, Arc<Vec<u8>>) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = Arc::new(dataset(1, 2_000_000));
+    std::fs::write(folder.path().join("a.lods"), &*file).expect("writable");
+    let here = SocketAddr::from(([127, 0, 0, 1], 0));
+    let mut config = ServeConfig::new(folder.path(), here);
+    change(&mut config);
+    (folder, spawn(config).expect("port 0 is free"), file)
+}
+
+/// Memory of this process, which is the server's and the clients'.
+fn resident_bytes() -> u64 {
+    let statm = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
+    let pages = statm.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok());
+    pages.unwrap_or(0) * 4096
+}
+
+#[test]
+fn ten_thousand_idle_connections_cost_little_and_keep_nobody_out() {
+    let limit = getrlimit(Resource::Nofile);
+    let raised = Rlimit { current: limit.maximum, maximum: limit.maximum };
+    setrlimit(Resource::Nofile, raised).expect("within its own maximum");
+    // Both ends are in this process; a system that allows fewer files gets as many as it allows.
+    let most = limit.maximum.map_or(10_000, |most| (most.saturating_sub(500) / 2).min(10_000));
+    let (_folder, server, file) = serve(|config| config.max_connections = 20_000);
+    let before = resident_bytes();
+    let idle: Vec<_> = (0..most)
+        .map(|i| {
+            let mut client = Client::connect(server.addr()).expect("the server accepts");
+            // Some have been served before they fell asleep.
+            if i % 10 == 0 {
+                let answer = client.ask("/a.lods", i, i + 999).expect("an answer");
+                assert_eq!(answer.body, file[i as usize..][..1000]);
+            }
+            client
+        })
+        .collect();
+    let each = resident_bytes().saturating_sub(before) / most;
+    println!("{most} idle connections, {each} bytes each");
+    assert!(each < 16 << 10, "{each} bytes for each idle connection");
+    let crowd = Crowd::start(server.addr(), "/a.lods", 4, move |_| Arc::clone(&file));
+    crowd.tally.wait_for_good(200);
+    crowd.stop();
+    drop(idle);
+}
+
+#[test]
+fn clients_that_send_a_byte_now_and_then_are_cut_off_and_keep_nobody_waiting() {
+    let (_folder, server, file) = serve(|config| config.head_timeout = Duration::from_millis(300));
+    let crowd = Crowd::start(server.addr(), "/a.lods", 2, move |_| Arc::clone(&file));
+    let mut slow: Vec<_> = (0..200)
+        .map(|_| {
+            let mut stream = TcpStream::connect(server.addr()).expect("the server accepts");
+            stream.write_all(b"GET /a.lods HTTP/1.1\r\nhost: x\r\nx-").expect("the server reads");
+            stream
+        })
+        .collect();
+    // Each is cut off though it never stops to send: writing fails in the end.
+    for stream in &mut slow {
+        while stream.write_all(b"y").is_ok() {
+            // Slow is what they are.
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+    crowd.tally.wait_for_good(50);
+    crowd.stop();
+}
+
+#[test]
+fn heads_and_lists_without_measure_are_refused_and_keep_nobody_waiting() {
+    let (_folder, server, file) = serve(|_| {});
+    let crowd = Crowd::start(server.addr(), "/a.lods", 2, move |_| Arc::clone(&file));
+    let list = |count: usize, spec: fn(usize) -> String| {
+        let specs: Vec<_> = (0..count).map(spec).collect();
+        format!("range: bytes={}\r\n", specs.join(","))
+    };
+    for (what, fields, statuses) in [
+        ("a field of 1 MiB", format!("x: {}\r\n", "y".repeat(1 << 20)), &["431", ""][..]),
+        ("1,000 fields", "x: y\r\n".repeat(1000), &["431", ""]),
+        ("1,000 ranges", list(1000, |i| format!("{0}-{0}", i * 300)), &["416"]),
+        ("1,000 times everything", list(1000, |_| "0-".into()), &["416"]),
+        ("256 times everything", list(256, |_| "0-".into()), &["206"]),
+        ("no number", "range: bytes=0-1\u{0}\r\n".into(), &["400"]),
+    ] {
+        let mut stream = TcpStream::connect(server.addr()).expect("the server accepts");
+        let request =
+            format!("GET /a.lods HTTP/1.1\r\nhost: x\r\nconnection: close\r\n{fields}\r\n");
+        // The server may close before it has taken everything.
+        let _ = stream.write_all(request.as_bytes());
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        assert!(answer.len() < 2_100_000, "{what}: {} bytes", answer.len());
+        let head = String::from_utf8_lossy(&answer[..answer.len().min(20)]).into_owned();
+        let status = head.split(' ').nth(1).unwrap_or_default();
+        assert!(statuses.contains(&status), "{what}: {head}");
+    }
+    crowd.tally.wait_for_good(50);
+    crowd.stop();
+}

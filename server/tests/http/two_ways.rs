@@ -1,0 +1,98 @@
+//! Plain range requests go a short way of their own: nobody must be able to tell.
+
+use std::{
+    io::{Read, Write},
+    net::TcpStream,
+};
+
+use crate::support::{Site, dataset};
+
+/// Head and body of the answer to a `GET`, on a connection that stays open.
+fn ask(stream: &mut TcpStream, path: &str, fields: &str) -> (Vec<String>, Vec<u8>) {
+    let request = format!("GET {path} HTTP/1.1\r\nhost: x\r\n{fields}\r\n");
+    stream.write_all(request.as_bytes()).expect("the server reads");
+    answer(stream)
+}
+
+/// The head's lines, sorted, without the date.
+fn answer(stream: &mut TcpStream) -> (Vec<String>, Vec<u8>) {
+    let mut head = Vec::new();
+    while !head.ends_with(b"\r\n\r\n") {
+        let mut byte = [0];
+        stream.read_exact(&mut byte).expect("the server answers");
+        head.push(byte[0]);
+    }
+    let head = String::from_utf8(head).expect("ASCII");
+    let length = head.lines().find_map(|line| line.strip_prefix("content-length: "));
+    let mut body = vec![0; length.expect("a length").parse().expect("a number")];
+    stream.read_exact(&mut body).expect("the server answers");
+    let lines = head.lines().filter(|line| !line.starts_with("date: "));
+    let mut lines: Vec<_> = lines.map(|line| line.trim_end().to_owned()).collect();
+    lines.sort();
+    (lines, body)
+}
+
+#[tokio::test]
+async fn both_ways_give_the_same_answer() {
+    let (site, bytes) = Site::with_dataset();
+    let index = site.json("/datasets").await;
+    let content = format!("/{}", index["datasets"][0]["content_url"].as_str().expect("text"));
+    let connect = || TcpStream::connect(site.server.addr()).expect("the server accepts");
+    let (mut short, mut long) = (connect(), connect());
+    for path in ["/a.lods", "/datasets/a.lods", &content] {
+        for (first, last) in [(0, 0), (0, 99), (5, 70_000), (300_000, 650_000), (9, 9_999_999)] {
+            let range = format!("range: bytes={first}-{last}\r\n");
+            let quick = ask(&mut short, path, &range);
+            // A field that the short way does not know.
+            let slow = ask(&mut long, path, &format!("{range}x-other: 1\r\n"));
+            assert_eq!(quick.0, slow.0, "{path} {range}");
+            assert!(quick.1 == slow.1 && quick.1 == bytes[first..=last.min(bytes.len() - 1)]);
+        }
+    }
+    for path in ["/a.lods?v=0", "/missing.lods", "/datasets/.lods"] {
+        let range = "range: bytes=0-9\r\n";
+        let quick = ask(&mut connect(), path, range);
+        assert_eq!(quick, ask(&mut connect(), path, &format!("{range}x-other: 1\r\n")), "{path}");
+    }
+}
+
+#[test]
+fn a_connection_may_change_its_way_in_the_middle_of_a_pipeline() {
+    let (site, bytes) = Site::with_dataset();
+    let mut stream = TcpStream::connect(site.server.addr()).expect("the server accepts");
+    let plain = |first: usize| {
+        format!("GET /a.lods HTTP/1.1\r\nhost: x\r\nrange: bytes={first}-{}\r\n\r\n", first + 9)
+    };
+    let other = "GET /healthz HTTP/1.1\r\nhost: x\r\n\r\n".to_owned();
+    let requests = [plain(0), plain(10), other, plain(20), plain(30)].concat();
+    // Cut within a head, so that both ways begin in the middle of one.
+    let (begin, end) = requests.split_at(requests.len() / 2 + 20);
+    stream.write_all(begin.as_bytes()).expect("the server reads");
+    assert_eq!(answer(&mut stream).1, bytes[0..10]);
+    stream.write_all(end.as_bytes()).expect("the server reads");
+    assert_eq!(answer(&mut stream).1, bytes[10..20]);
+    assert_eq!(answer(&mut stream).1, b"ok\n");
+    assert_eq!(answer(&mut stream).1, bytes[20..30]);
+    assert_eq!(answer(&mut stream).1, bytes[30..40]);
+}
+
+#[test]
+fn what_is_asked_for_again_and_again_is_sent_right_however_it_is_sent() {
+    let site = Site::new();
+    let bytes = dataset(7, 3_000_000);
+    site.put("a.lods", &bytes);
+    let mut stream = TcpStream::connect(site.server.addr()).expect("the server accepts");
+    // Long before the end, the file has earned its private copy.
+    for round in 0..40u32 {
+        let first = (round * 65_537) as usize % 1_000_000;
+        let last = first + 1_500_000;
+        let range = format!("range: bytes={first}-{last}\r\n");
+        assert!(ask(&mut stream, "/a.lods", &range).1 == bytes[first..=last], "{round}");
+    }
+    // What is in its place by now must not be taken from there.
+    let new = dataset(8, 3_000_000);
+    site.put("b", &new);
+    std::fs::rename(site.path("b"), site.path("a.lods")).expect("one folder");
+    let (_, body) = ask(&mut stream, "/a.lods", "range: bytes=100000-900000\r\n");
+    assert!(body == new[100_000..=900_000]);
+}
