@@ -2,10 +2,12 @@
 
 pub mod camera;
 pub mod commands;
+pub mod doctor;
 pub mod engine;
 pub mod eval;
 mod full_resolution;
 mod interrupt;
+pub mod load;
 pub mod metrics;
 pub mod path;
 pub mod render;

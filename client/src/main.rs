@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use lodestream_client::{
-    commands::{demo, eval, export, shot, stability, view},
+    commands::{demo, doctor, eval, export, load, shot, stability, view},
     source::{BlockingSource, Source, use_token},
 };
 use lodestream_server::commands::{build, finish, inspect, preview, serve, sign, token, verify};
@@ -34,6 +34,8 @@ enum Command {
     Shot(shot::ShotArgs),
     Demo(demo::DemoArgs),
     Eval(eval::EvalArgs),
+    Load(load::LoadArgs),
+    Doctor(doctor::DoctorArgs),
     Stability(stability::StabilityArgs),
     View(view::ViewArgs),
 }
@@ -55,6 +57,8 @@ fn main() -> ExitCode {
         Command::Shot(args) => shot::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Eval(args) => eval::run(args),
+        Command::Load(args) => load::run(args),
+        Command::Doctor(args) => doctor::run(args),
         Command::Stability(args) => stability::run(args),
         Command::View(args) => view::run(args),
     })

@@ -351,6 +351,15 @@ pub fn decode_group(
     node: &Node,
     payload: &[u8],
 ) -> Result<DecodedGroup> {
+    check_group(node, group, payload)?;
+    decode_unchecked(manifest, group, node, payload)
+}
+
+/// Checks that `payload` is what was written for that group of `node`, without decoding it.
+///
+/// # Errors
+/// [`Error::Checksum`] where it is not, [`Error::Corrupt`] where the node has no such group.
+pub fn check_group(node: &Node, group: usize, payload: &[u8]) -> Result<()> {
     let reference = node.payloads.get(group).ok_or_else(|| corrupt("node", "no such group"))?;
     let found = crc32fast::hash(payload);
     if found != reference.crc {
@@ -360,7 +369,7 @@ pub fn decode_group(
             found,
         });
     }
-    decode_unchecked(manifest, group, node, payload)
+    Ok(())
 }
 
 /// [`decode_group`] without the checksum: for fuzzing the decoder behind it.

@@ -32,7 +32,9 @@ pub use batch::{
 pub use boot::{
     BOOT_SPECULATIVE_BYTES, Boot, HEADER_BYTES, Header, MAGIC, VERSION_MAJOR, VERSION_MINOR,
 };
-pub use column::{Column, DecodedGroup, Encoding, decode_group, decode_unchecked, encode_column};
+pub use column::{
+    Column, DecodedGroup, Encoding, check_group, decode_group, decode_unchecked, encode_column,
+};
 pub use dataset::{Dataset, NodePoints, ReadAt};
 pub use error::{Error, Result};
 pub use hierarchy::{HierarchyPage, MAX_NODE_POINTS, Node, PageRef, PayloadRef};

@@ -377,7 +377,7 @@ async fn exchange(stream: &TcpStream, request: &[u8]) -> io::Result<()> {
     let mut left = None;
     while left != Some(0) {
         stream.readable().await?;
-        let taken = TAKEN.with_borrow_mut(|taken| {
+        let taken: io::Result<Option<usize>> = TAKEN.with_borrow_mut(|taken| {
             let count = stream.try_read(taken)?;
             if count == 0 {
                 return Err(io::ErrorKind::UnexpectedEof.into());

@@ -10,6 +10,7 @@ use clap::Args;
 use lodestream_server::commands::{cancel_on_interrupt, print};
 
 use crate::{
+    commands::command_line,
     engine::Policy,
     eval::{self, EvalConfig, Report, ViewSize},
     render::{Splat, SplatSize},
@@ -114,7 +115,7 @@ pub fn run(args: EvalArgs) -> anyhow::Result<ExitCode> {
         runs: 5,
         stream_budget: args.stream_budget,
         seed: args.seed,
-        command: command(),
+        command: command_line(),
     };
     if args.quick {
         config.size_px = [320, 180];
@@ -138,18 +139,6 @@ pub fn run(args: EvalArgs) -> anyhow::Result<ExitCode> {
     }
     print(&format!("{summary}\n{}\n", folder.join("eval.html").display()))?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The command line that was given.
-fn command() -> String {
-    let quoted = |argument: String| {
-        let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=%".contains(c);
-        let is_plain = !argument.is_empty() && argument.chars().all(plain);
-        if is_plain { argument } else { format!("'{}'", argument.replace('\'', r"'\''")) }
-    };
-    let arguments = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned()));
-    let arguments: Vec<_> = arguments.collect();
-    format!("lodestream {}", arguments.join(" "))
 }
 
 fn compare(before: &Path, after: &Path) -> anyhow::Result<ExitCode> {

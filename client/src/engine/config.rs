@@ -43,6 +43,18 @@ pub struct EngineConfig {
     /// Attributes that the view needs besides positions. Their column groups are fetched; the
     /// others are not. Names that a cloud lacks are ignored.
     pub attributes: Vec<String>,
+    /// What becomes of payloads that have come.
+    pub payloads: Payloads,
+}
+
+/// What becomes of payloads that have come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Payloads {
+    /// They are decoded and kept.
+    Decode,
+    /// Their checksums are verified; then only their sizes are kept. Plans draw nodes without points, and
+    /// count those that there would be.
+    Count,
 }
 
 /// In which order wanted pieces are loaded.
@@ -99,6 +111,7 @@ impl Default for EngineConfig {
             cancels: true,
             speculative_bytes: BOOT_SPECULATIVE_BYTES,
             attributes: vec!["color".into()],
+            payloads: Payloads::Decode,
         }
     }
 }

@@ -6,6 +6,15 @@ use lodestream_protocol::{Boot, DecodedGroup, HierarchyPage, NodeKey};
 
 use super::piece::{NodeId, PieceId};
 
+/// What there is of a column group.
+#[derive(Debug)]
+pub(super) enum Content {
+    /// All of it.
+    Decoded(DecodedGroup),
+    /// So many bytes that it would take if it were decoded.
+    Counted(u64),
+}
+
 /// Something has arrived, or never will; or a cloud comes or goes.
 #[derive(Debug)]
 pub(super) enum Event {
@@ -24,7 +33,7 @@ pub(super) enum Event {
     /// The page below a node.
     Page { cloud: usize, parent: NodeKey, page: HierarchyPage },
     /// A column group of a node.
-    Group { node: NodeId, group: usize, decoded: DecodedGroup },
+    Group { node: NodeId, group: usize, content: Content },
     /// A piece is damaged for good.
     Lost { piece: PieceId, message: String },
 }

@@ -15,6 +15,7 @@
 mod board;
 mod clip;
 mod clouds;
+mod commons;
 mod config;
 mod depth;
 mod drawing;
@@ -36,6 +37,7 @@ mod simulated;
 mod stats;
 mod store;
 mod sync;
+mod tasked;
 mod traversal;
 mod tree;
 mod view;
@@ -46,15 +48,17 @@ use lodestream_protocol::Boot;
 
 pub use board::CloudStatus;
 pub use clip::ClipBox;
-pub use config::{Coalesce, EngineConfig, LoadOrder};
+pub use commons::Commons;
+pub use config::{Coalesce, EngineConfig, LoadOrder, Payloads};
 pub use depth::DepthPyramid;
 pub use error::EngineError;
 pub use occlusion::SplatReach;
-pub use plan::{DrawNode, FramePlan, LeftOut, Tally};
+pub use plan::{DrawNode, FramePlan, LeftOut, Tally, WantedNode};
 pub use policy::Policy;
 pub use priority::Priority;
 pub use simulated::SimulatedEngine;
 pub use stats::{EngineStats, Phase, Totals};
+pub use tasked::TaskedEngine;
 pub use view::View;
 pub(crate) use view::{Optics, WorldBox};
 

@@ -17,11 +17,25 @@ pub struct DrawNode {
     /// Distance between neighbouring points of the node, world units.
     pub spacing: f32,
     /// Its elements: positions, and the columns that have arrived. Columns of further groups may
-    /// still be missing while [`FramePlan::settled`] is false.
+    /// still be missing while [`FramePlan::settled`] is false. Empty where the engine
+    /// [only counts](super::Payloads::Count).
     pub points: Arc<NodePoints>,
     /// 0 where these are all elements of the node, as in every plan. Whoever draws a part of them gives
     /// each part of a node another number: renderers know by it what they have.
     pub part: u64,
+}
+
+/// A node that a view wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WantedNode {
+    /// Index of the cloud, in the order of the sources given to the engine.
+    pub cloud: usize,
+    /// The node.
+    pub key: NodeKey,
+    /// Length of its payloads that the view needs, in the file.
+    pub bytes: u64,
+    /// Whether all of them are loaded.
+    pub is_there: bool,
 }
 
 /// Nodes and their points.

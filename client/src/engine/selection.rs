@@ -278,8 +278,9 @@ impl Walk<'_> {
         }
         let cell_world = f64::from(cell_bits).exp2() * manifest.lattice.scale;
         let bounds = WorldBox::of(&node.bounds, &manifest.lattice);
+        let cell_px = cell_world * self.optics.largest_scale(&bounds);
         // Where the numbers are no numbers, too.
-        !(cell_world * self.optics.largest_scale(&bounds) <= self.limits.cell_px)
+        cell_px.partial_cmp(&self.limits.cell_px).is_none_or(Ordering::is_gt)
     }
 
     /// Reserves points for the children of a replaced node and returns by how much the whole grows,
@@ -565,7 +566,7 @@ mod tests {
 
         /// The tree with these pages.
         fn tree<'a>(&self, pages: impl IntoIterator<Item = &'a NodeKey>) -> Vec<Option<Tree>> {
-            let mut tree = Tree::new(Arc::clone(&self.boot));
+            let mut tree = Tree::new(Arc::clone(&self.boot), None);
             pages.into_iter().for_each(|key| tree.add_page(*key, self.pages[key].clone()));
             vec![Some(tree)]
         }
@@ -751,7 +752,7 @@ mod tests {
         let mut huge = forest.boot.as_ref().clone();
         huge.root_page.nodes[0].points = 1_000_000;
         let mut trees = forest.tree(forest.pages.keys());
-        trees.insert(0, Some(Tree::new(Arc::new(huge))));
+        trees.insert(0, Some(Tree::new(Arc::new(huge), None)));
         let limits = LIMITS;
         let optics = optics([128.0, -400.0, 128.0], [128.0; 3], 1.0);
         let selection = selected(&mut trees, &optics, limits, &HashSet::new());

@@ -39,6 +39,7 @@ pub(super) struct Counters {
     pub retries: Counter,
     pub cancelled: Counter,
     pub damaged: Counter,
+    pub page_bytes: Counter,
     pub decoded_nodes: Counter,
     pub decode_nanos: Counter,
     pub plans: Counter,
@@ -61,6 +62,7 @@ impl Counters {
             retries: self.retries.get(),
             cancelled: self.cancelled.get(),
             damaged: self.damaged.get(),
+            page_bytes: self.page_bytes.get(),
             decoded_nodes: self.decoded_nodes.get(),
             decode_ms: Duration::from_nanos(self.decode_nanos.get()).as_secs_f64() * 1e3,
             plans: self.plans.get(),
@@ -88,6 +90,8 @@ pub struct Totals {
     pub cancelled: u64,
     /// Pieces that arrived but could not be decoded.
     pub damaged: u64,
+    /// Bytes of hierarchy pages that arrived, save for the roots'.
+    pub page_bytes: u64,
     /// Payloads and pages decoded.
     pub decoded_nodes: u64,
     /// Milliseconds spent decoding, summed over threads.
@@ -119,6 +123,7 @@ impl Totals {
             retries: self.retries - earlier.retries,
             cancelled: self.cancelled - earlier.cancelled,
             damaged: self.damaged - earlier.damaged,
+            page_bytes: self.page_bytes - earlier.page_bytes,
             decoded_nodes: self.decoded_nodes - earlier.decoded_nodes,
             decode_ms: self.decode_ms - earlier.decode_ms,
             plans: self.plans - earlier.plans,

@@ -8,10 +8,13 @@ use std::{
     sync::Arc,
 };
 
-use lodestream_protocol::{DecodedGroup, NodePoints};
+use lodestream_protocol::NodePoints;
 use lru::LruCache;
 
-use super::piece::{NodeId, PieceId};
+use super::{
+    event::Content,
+    piece::{NodeId, PieceId},
+};
 
 /// The groups of a node as bits; manifests hold at most 64.
 pub(super) type GroupMask = u64;
@@ -85,8 +88,8 @@ impl Store {
         self.find(cloud);
     }
 
-    /// Adds a decoded group. Call [`pin`](Self::pin) afterwards: until then it counts as cached.
-    pub fn add(&mut self, id: NodeId, group: usize, decoded: DecodedGroup) {
+    /// Adds a group. Call [`pin`](Self::pin) afterwards: until then it counts as cached.
+    pub fn add(&mut self, id: NodeId, group: usize, content: Content) {
         let (resident, total) = if let Some(resident) = self.pinned.get_mut(&id) {
             (resident, &mut self.pinned_bytes)
         } else {
@@ -97,15 +100,19 @@ impl Store {
         if resident.groups & group_bit(group) != 0 {
             return;
         }
-        // Copies where a plan holds the points: a further group came after the first picture.
-        if Arc::make_mut(&mut resident.points).add(decoded).is_err() {
-            // Fine positions of a node that was dropped meanwhile: they will be asked for again.
-            return;
-        }
+        let bytes = match content {
+            Content::Decoded(decoded) => {
+                // Copies where a plan holds the points: a further group came after the first picture.
+                if Arc::make_mut(&mut resident.points).add(decoded).is_err() {
+                    // Fine positions of a node that was dropped meanwhile: they will be asked for again.
+                    return;
+                }
+                size_bytes(&resident.points)
+            }
+            Content::Counted(bytes) => resident.bytes + bytes,
+        };
         resident.groups |= group_bit(group);
-        let points = resident.points.as_ref();
         self.fresh.insert(id);
-        let bytes = size_bytes(points);
         *total += bytes - resident.bytes;
         resident.bytes = bytes;
     }
@@ -185,7 +192,7 @@ fn size_bytes(points: &NodePoints) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use lodestream_protocol::{Column, NodeKey};
+    use lodestream_protocol::{Column, DecodedGroup, NodeKey};
 
     use super::*;
     use crate::engine::piece::Part;
@@ -195,8 +202,9 @@ mod tests {
     }
 
     /// 12 bytes a point.
-    fn base(points: usize) -> DecodedGroup {
-        DecodedGroup { positions: vec![[1, 2, 3]; points], ..DecodedGroup::default() }
+    fn base(points: usize) -> Content {
+        let positions = vec![[1, 2, 3]; points];
+        Content::Decoded(DecodedGroup { positions, ..DecodedGroup::default() })
     }
 
     fn store(cache_limit: u64, nodes: u8) -> Store {
@@ -244,16 +252,19 @@ mod tests {
     #[test]
     fn groups_join_in_any_order_and_leave_shared_points_alone() {
         let columns = vec![Column { attribute: 1, bytes: vec![0; 20] }];
-        let further = DecodedGroup { columns, ..DecodedGroup::default() };
+        let further = || {
+            let columns = columns.clone();
+            Content::Decoded(DecodedGroup { columns, ..DecodedGroup::default() })
+        };
         let mut store = Store::new(1000);
-        store.add(id(0), 1, further.clone());
+        store.add(id(0), 1, further());
         assert!(store.points(id(0)).is_none(), "no positions yet");
         store.add(id(0), 0, base(10));
         assert_eq!(store.groups(id(0)), 0b11);
 
         store.add(id(1), 0, base(10));
         let shown = Arc::clone(store.points(id(1)).expect("there"));
-        store.add(id(1), 1, further);
+        store.add(id(1), 1, further());
         assert!(shown.columns.is_empty());
         assert_eq!(store.points(id(1)).expect("there").columns.len(), 1);
         assert_eq!(store.cached_bytes(), 2 * 140);

@@ -14,13 +14,14 @@ use lodestream_protocol::Boot;
 use super::{
     board::CloudStatus,
     clouds::Clouds,
+    commons::Commons,
     config::EngineConfig,
     drawing::{self, Presence},
     event::Event,
     inbox::{Demand, TraversalMail},
     occlusion::{Drawn, DrawnNode, Occluders},
     piece::{NodeId, Part, Piece, PieceId},
-    plan::{DrawNode, FramePlan},
+    plan::{DrawNode, FramePlan, WantedNode},
     selection::{self, Limits, Pick, Selection},
     settings::Settings,
     shared::Shared,
@@ -58,6 +59,10 @@ pub(super) struct Traversal {
     in_sight: HashSet<NodeId>,
     /// What the newest plan draws, and how exactly.
     shown: Vec<DrawnNode>,
+    /// What the newest plan wants: indices into the selection.
+    needed: Vec<usize>,
+    /// Where other engines may have the same pages.
+    commons: Option<Arc<Commons>>,
     /// Whether everything that the newest plan wants is there.
     is_loaded: bool,
     sequence: u64,
@@ -103,9 +108,33 @@ impl Traversal {
             outdated: 0,
             in_sight: HashSet::new(),
             shown: Vec::new(),
+            needed: Vec::new(),
+            commons: None,
             is_loaded: false,
             sequence: 0,
         }
+    }
+
+    /// The same, keeping what is equal in other engines once.
+    pub fn sharing(self, commons: Arc<Commons>) -> Self {
+        Self { commons: Some(commons), ..self }
+    }
+
+    /// What the newest plan wants.
+    pub fn wanted(&self) -> impl Iterator<Item = WantedNode> {
+        self.needed.iter().map(|&i| {
+            let pick = &self.selection.picks[i];
+            let cloud = self.clouds[pick.id.cloud];
+            let groups = cloud.groups | if pick.is_exact { cloud.fine } else { 0 };
+            let payloads = pick.node.payloads.iter().enumerate();
+            let wanted = payloads.filter(|(group, _)| groups & group_bit(*group) != 0);
+            WantedNode {
+                cloud: cloud.number,
+                key: pick.id.key,
+                bytes: wanted.map(|(_, payload)| u64::from(payload.bytes)).sum(),
+                is_there: groups & !self.store.groups(pick.id) == 0,
+            }
+        })
     }
 
     /// Runs until the inbox says to end.
@@ -225,7 +254,7 @@ impl Traversal {
                         reselect = true;
                     }
                 }
-                Event::Group { node, group, decoded } => self.store.add(node, group, decoded),
+                Event::Group { node, group, content } => self.store.add(node, group, content),
                 Event::Lost { piece, message } => {
                     self.store.lose(piece);
                     // Nothing is hidden any more: see `select`.
@@ -261,7 +290,7 @@ impl Traversal {
 
     fn open(&mut self, cloud: usize, boot: Arc<Boot>) {
         let number = self.clouds[cloud].number;
-        let mut tree = Tree::new(Arc::clone(&boot));
+        let mut tree = Tree::new(Arc::clone(&boot), self.commons.clone());
         tree.hide(self.settings.hidden.contains(&number));
         self.trees[cloud] = Some(tree);
         self.clouds[cloud].failed = false;
@@ -342,7 +371,7 @@ impl Traversal {
         for &i in &drawing.drawn {
             let pick = &self.selection.picks[i];
             if let Some(points) = self.store.points(pick.id) {
-                plan.points += points.positions.len() as u64;
+                plan.points += u64::from(pick.node.points);
                 plan.nodes.push(DrawNode {
                     cloud: self.clouds[pick.id.cloud].number,
                     key: pick.id.key,
@@ -375,6 +404,7 @@ impl Traversal {
         });
         self.shown = plan.nodes.iter().map(DrawnNode::of).collect();
         self.is_loaded = self.view.is_some() && all_open && pieces.is_empty();
+        self.needed = drawing.needed;
         plan.settled = self.is_loaded && self.hides_rightly();
         // Per cloud, so that a host which does not answer keeps nothing from the others.
         let mut bytes = vec![0; self.clouds.len()];

@@ -8,17 +8,18 @@ use std::{collections::HashMap, sync::Arc};
 
 use lodestream_protocol::{Boot, HierarchyPage, Node, NodeKey};
 
+use super::commons::{Commons, PageId, PageNodes, page_nodes};
+
 /// Nodes that one cloud's tree may hold before untouched pages are dropped; about 128 MiB.
 const MAX_NODES: usize = 1 << 19;
-
-/// Which page: `None` is the root page, `Some(key)` the one below that node.
-type PageId = Option<NodeKey>;
 
 /// The loaded part of a tree.
 #[derive(Debug)]
 pub(super) struct Tree {
     boot: Arc<Boot>,
     pages: HashMap<PageId, Page>,
+    /// Where other trees may have the same pages.
+    commons: Option<Arc<Commons>>,
     nodes: usize,
     walk: u64,
     is_hidden: bool,
@@ -26,7 +27,7 @@ pub(super) struct Tree {
 
 #[derive(Debug)]
 struct Page {
-    nodes: HashMap<NodeKey, Arc<Node>>,
+    nodes: Arc<PageNodes>,
     /// The last walk that looked into it.
     walk: u64,
 }
@@ -48,8 +49,9 @@ pub(super) enum Children {
 }
 
 impl Tree {
-    pub fn new(boot: Arc<Boot>) -> Self {
-        let mut tree = Self { pages: HashMap::new(), nodes: 0, walk: 0, is_hidden: false, boot };
+    pub fn new(boot: Arc<Boot>, commons: Option<Arc<Commons>>) -> Self {
+        let pages = HashMap::new();
+        let mut tree = Self { pages, commons, nodes: 0, walk: 0, is_hidden: false, boot };
         let root_page = tree.boot.root_page.clone();
         tree.insert(None, root_page);
         tree
@@ -70,8 +72,10 @@ impl Tree {
     }
 
     fn insert(&mut self, id: PageId, page: HierarchyPage) {
-        let nodes: HashMap<_, _> =
-            page.nodes.into_iter().map(|node| (node.key, Arc::new(node))).collect();
+        let nodes = match &self.commons {
+            Some(commons) => commons.nodes(&self.boot, id, page),
+            None => Arc::new(page_nodes(page)),
+        };
         self.nodes += nodes.len();
         if let Some(old) = self.pages.insert(id, Page { nodes, walk: self.walk }) {
             self.nodes -= old.nodes.len();

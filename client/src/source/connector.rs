@@ -38,12 +38,25 @@ pub(super) struct Connector {
     timeouts: Timeouts,
     /// Whether it connects to this machine: then no proxy is asked.
     is_loopback: bool,
+    /// Whether it may have to do with https.
+    needs_certificates: bool,
     client: OnceLock<Result<Client, String>>,
 }
 
 impl Connector {
     pub fn new(timeouts: Timeouts, url: &Url) -> Self {
-        Self { timeouts, is_loopback: is_loopback(url), client: OnceLock::new() }
+        Self {
+            timeouts,
+            is_loopback: is_local(url),
+            needs_certificates: true,
+            client: OnceLock::new(),
+        }
+    }
+
+    /// The same, for http alone. To read the system's certificates takes 6 ms of processor time: more than
+    /// all else that a client does until its first picture.
+    pub fn without_certificates(self) -> Self {
+        Self { needs_certificates: false, ..self }
     }
 
     /// The client, or why there is none.
@@ -67,11 +80,16 @@ impl Connector {
         if self.is_loopback {
             builder = builder.no_proxy();
         }
+        if !self.needs_certificates {
+            builder = builder.tls_certs_only([]);
+        }
         builder.build().map_err(|e| format!("no HTTP client: {e}"))
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        self.timeouts == other.timeouts && self.is_loopback == other.is_loopback
+        self.timeouts == other.timeouts
+            && self.is_loopback == other.is_loopback
+            && self.needs_certificates == other.needs_certificates
     }
 }
 
@@ -93,7 +111,9 @@ impl Connections {
     }
 }
 
-fn is_loopback(url: &Url) -> bool {
+/// Whether a URL names this machine by its loopback address.
+#[must_use]
+pub fn is_local(url: &Url) -> bool {
     let host = url.host_str().unwrap_or_default().trim_matches(['[', ']']);
     host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback())
 }

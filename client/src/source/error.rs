@@ -1,5 +1,7 @@
 //! Why a source did not deliver.
 
+use super::Fault;
+
 /// Why bytes could not be had. Variants follow what a caller does next.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SourceError {
@@ -10,6 +12,8 @@ pub enum SourceError {
         place: String,
         /// What happened.
         message: String,
+        /// Its kind.
+        fault: Fault,
     },
     /// The file is no longer the one that was opened: nothing more of that one can be had.
     /// [`Source::renew`](super::Source::renew) makes a source of the one that is there now.
@@ -25,6 +29,8 @@ pub enum SourceError {
         place: String,
         /// What is wrong and what to do.
         message: String,
+        /// Its kind.
+        fault: Fault,
     },
 }
 
@@ -35,11 +41,29 @@ impl SourceError {
         matches!(self, Self::Transient { .. })
     }
 
+    /// The kind of failure.
+    #[must_use]
+    pub const fn fault(&self) -> Fault {
+        match self {
+            Self::Transient { fault, .. } | Self::Permanent { fault, .. } => *fault,
+            Self::Replaced { .. } => Fault::Replaced,
+        }
+    }
+
     pub(super) fn transient(place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self::Transient { place: place.into(), message: message.into() }
+        Self::Transient { place: place.into(), message: message.into(), fault: Fault::Other }
     }
 
     pub(super) fn permanent(place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self::Permanent { place: place.into(), message: message.into() }
+        Self::Permanent { place: place.into(), message: message.into(), fault: Fault::Other }
+    }
+
+    /// The same, of that kind.
+    pub(super) fn of(mut self, kind: Fault) -> Self {
+        match &mut self {
+            Self::Transient { fault, .. } | Self::Permanent { fault, .. } => *fault = kind,
+            Self::Replaced { .. } => {}
+        }
+        self
     }
 }

@@ -21,8 +21,9 @@ use reqwest::{
 };
 
 use super::{
-    Announced, BatchLimits, SourceError,
+    Announced, BatchLimits, Fault, SourceError, Wire,
     connector::{Connections, Connector, Timeouts},
+    wire::Trip,
 };
 
 /// A dataset file at a URL. Clones share connections.
@@ -37,6 +38,7 @@ struct Inner {
     url: Url,
     /// The URL without what may be secret.
     place: String,
+    wire: Wire,
     /// Set by the first good answer.
     identity: OnceLock<Identity>,
     /// What the host offers, set by the first answer that tells.
@@ -88,26 +90,37 @@ impl HttpSource {
     /// A source at `url`. Nothing is asked yet.
     #[must_use]
     pub fn with_timeouts(url: Url, timeouts: Timeouts) -> Self {
-        let connector = Arc::new(Connector::new(timeouts, &url));
-        Self::through(connector, url)
+        Self::by_wire(url, timeouts, Wire::default())
     }
 
-    fn through(connector: Arc<Connector>, url: Url) -> Self {
+    /// A source at `url` whose requests go through `wire`. Nothing is asked yet.
+    #[must_use]
+    pub fn by_wire(url: Url, timeouts: Timeouts, wire: Wire) -> Self {
+        let connector = Connector::new(timeouts, &url);
+        // There may be thousands that are measured, and each of them a client of its own.
+        let needs_none = wire.meter.is_some() && url.scheme() == "http";
+        let connector = if needs_none { connector.without_certificates() } else { connector };
+        Self::through(Arc::new(connector), url, wire)
+    }
+
+    fn through(connector: Arc<Connector>, url: Url, wire: Wire) -> Self {
         let place = without_secrets(&url);
         let (identity, batches) = (OnceLock::new(), OnceLock::new());
         let takes_no_batches = AtomicBool::new(false);
-        let inner = Inner { connector, url, place, identity, batches, takes_no_batches };
+        let inner = Inner { connector, url, place, wire, identity, batches, takes_no_batches };
         Self { inner: Arc::new(inner) }
     }
 
     /// A source of whatever lies at the URL now. Shares connections.
     pub(super) fn renew(&self) -> Self {
-        Self::through(Arc::clone(&self.inner.connector), self.inner.url.clone())
+        let Inner { connector, url, wire, .. } = &*self.inner;
+        Self::through(Arc::clone(connector), url.clone(), wire.clone())
     }
 
     /// The source, sharing connections with others.
     pub(super) fn sharing(&self, connections: &Connections) -> Self {
-        Self::through(connections.shared(&self.inner.connector), self.inner.url.clone())
+        let Inner { connector, url, wire, .. } = &*self.inner;
+        Self::through(connections.shared(connector), url.clone(), wire.clone())
     }
 
     /// The URL, with whatever secrets it holds.
@@ -126,8 +139,8 @@ impl HttpSource {
         len: u64,
         sink: &mut (dyn FnMut(Bytes) + Send),
     ) -> Result<(), SourceError> {
-        let (response, range) = self.ask(Ask { offset, len, may_end: false }).await?;
-        self.read_body(response, range.end - range.start, sink).await
+        let ask = Ask { offset, len, may_end: false };
+        self.transfer(ask, &mut |piece, _| sink(piece)).await
     }
 
     pub(super) async fn stream_prefix(
@@ -135,9 +148,26 @@ impl HttpSource {
         len: u64,
         sink: &mut (dyn FnMut(Bytes, Announced) + Send),
     ) -> Result<(), SourceError> {
-        let (response, range) = self.ask(Ask { offset: 0, len, may_end: true }).await?;
-        let announced = Announced { len: range.end - range.start, total: range.total };
-        self.read_body(response, announced.len, &mut |piece| sink(piece, announced)).await
+        self.transfer(Ask { offset: 0, len, may_end: true }, sink).await
+    }
+
+    /// Sends the request and hands on its answer, by the wire.
+    async fn transfer(
+        &self,
+        ask: Ask,
+        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
+    ) -> Result<(), SourceError> {
+        let mut trip = self.depart(ask.offset).await?;
+        let outcome = match self.ask(ask).await {
+            Ok((response, range)) => {
+                trip.answered().await;
+                let announced = Announced { len: range.end - range.start, total: range.total };
+                self.read_body(response, announced, &mut trip, sink).await
+            }
+            Err(error) => Err(error),
+        };
+        trip.end(outcome.as_ref().err().map(SourceError::fault));
+        outcome
     }
 
     pub(super) fn batch_limits(&self) -> Option<BatchLimits> {
@@ -154,15 +184,39 @@ impl HttpSource {
         let offer = self.inner.batches.get().filter(|_| self.batch_limits().is_some());
         if let Some(offer) = offer {
             let request = BatchRequest { content_id: offer.content_id, parts: parts.to_vec() };
-            match self.ask_for_batch(&request).await? {
-                Some(response) => return self.read_batch(response, request, sink).await,
-                None => self.inner.takes_no_batches.store(true, Ordering::Relaxed),
+            let start = parts.first().map_or(0, |part| part.offset);
+            let mut trip = self.depart(start).await?;
+            let outcome = self.transfer_batch(request, &mut trip, sink).await;
+            trip.end(outcome.as_ref().err().map(SourceError::fault));
+            if outcome? {
+                return Ok(());
             }
+            self.inner.takes_no_batches.store(true, Ordering::Relaxed);
         }
         for part in parts {
             self.stream_range(part.offset, u64::from(part.bytes), sink).await?;
         }
         Ok(())
+    }
+
+    /// Sends the request and hands on its answer, by the wire; `false` where it is not of a host that takes
+    /// batches.
+    async fn transfer_batch(
+        &self,
+        request: BatchRequest,
+        trip: &mut Trip<'_>,
+        sink: &mut (dyn FnMut(Bytes) + Send),
+    ) -> Result<bool, SourceError> {
+        let Some(response) = self.ask_for_batch(&request).await? else { return Ok(false) };
+        trip.answered().await;
+        self.read_batch(response, request, trip, sink).await?;
+        Ok(true)
+    }
+
+    /// Lets a request for bytes from `offset` go.
+    async fn depart(&self, offset: u64) -> Result<Trip<'_>, SourceError> {
+        let trip = self.inner.wire.depart(offset).await;
+        trip.ok_or_else(|| self.permanent("no more requests may be sent"))
     }
 
     /// `None` where the answer is not of a host that takes batches.
@@ -181,7 +235,8 @@ impl HttpSource {
             }
             StatusCode::PRECONDITION_FAILED => return Err(self.changed()),
             StatusCode::RANGE_NOT_SATISFIABLE => {
-                return Err(self.permanent("a part is beyond the end of the file: cut short"));
+                let message = "a part is beyond the end of the file: cut short";
+                return Err(self.permanent(message).of(Fault::Status(status.as_u16())));
             }
             StatusCode::REQUEST_TIMEOUT | StatusCode::TOO_EARLY | StatusCode::TOO_MANY_REQUESTS => {
             }
@@ -189,26 +244,35 @@ impl HttpSource {
             _ if status.is_server_error() => {}
             _ => return Ok(None),
         }
-        Err(self.transient(format!("the host answered {status}")))
+        let error = self.transient(format!("the host answered {status}"));
+        Err(error.of(Fault::Status(status.as_u16())))
     }
 
     async fn read_batch(
         &self,
         mut response: Response,
         request: BatchRequest,
+        trip: &mut Trip<'_>,
         sink: &mut (dyn FnMut(Bytes) + Send),
     ) -> Result<(), SourceError> {
         let mut decoder = BatchDecoder::new(request);
         while let Some(mut piece) = response.chunk().await.map_err(|e| self.classify(&e))? {
+            trip.received(piece.len() as u64).await;
             while !piece.is_empty() {
-                let step = decoder.step(&piece).map_err(|e| self.transient(e.to_string()))?;
+                let step = decoder
+                    .step(&piece)
+                    .map_err(|e| self.transient(e.to_string()).of(Fault::WrongRange))?;
                 let bytes = piece.split_to(step.bytes);
                 if step.is_payload {
                     sink(bytes);
                 }
             }
         }
-        if decoder.is_complete() { Ok(()) } else { Err(self.transient("the answer broke off")) }
+        if decoder.is_complete() {
+            Ok(())
+        } else {
+            Err(self.transient("the answer broke off").of(Fault::BrokenOff))
+        }
     }
 
     pub(super) async fn size(&self) -> Result<u64, SourceError> {
@@ -258,10 +322,9 @@ impl HttpSource {
         if let Some(length) = response.content_length()
             && length != range.end - range.start
         {
-            return Err(self.transient(format!(
-                "the answer is {length} bytes long but announces {}",
-                range.end - range.start
-            )));
+            let announced = range.end - range.start;
+            let wrong = format!("the answer is {length} bytes long but announces {announced}");
+            return Err(self.transient(wrong).of(Fault::WrongRange));
         }
         Ok((response, range))
     }
@@ -269,20 +332,23 @@ impl HttpSource {
     async fn read_body(
         &self,
         mut response: Response,
-        expected: u64,
-        sink: &mut (dyn FnMut(Bytes) + Send),
+        announced: Announced,
+        trip: &mut Trip<'_>,
+        sink: &mut (dyn FnMut(Bytes, Announced) + Send),
     ) -> Result<(), SourceError> {
-        let mut received = 0;
+        let (expected, mut received) = (announced.len, 0);
         while let Some(piece) = response.chunk().await.map_err(|e| self.classify(&e))? {
             received += piece.len() as u64;
             if received > expected {
-                return Err(self.transient(format!("more than the {expected} bytes asked for")));
+                let more = format!("more than the {expected} bytes asked for");
+                return Err(self.transient(more).of(Fault::WrongRange));
             }
-            sink(piece);
+            trip.received(piece.len() as u64).await;
+            sink(piece, announced);
         }
         if received < expected {
-            return Err(self
-                .transient(format!("the answer broke off after {received} of {expected} bytes")));
+            let short = format!("the answer broke off after {received} of {expected} bytes");
+            return Err(self.transient(short).of(Fault::BrokenOff));
         }
         Ok(())
     }
@@ -291,10 +357,12 @@ impl HttpSource {
         let text = headers.get(header::CONTENT_RANGE).and_then(|v| v.to_str().ok());
         let encoding = headers.get(header::CONTENT_ENCODING);
         if encoding.is_some_and(|e| e != "identity") {
-            return Err(self.permanent("the host compresses ranges; switch that off for .lods"));
+            let message = "the host compresses ranges; switch that off for .lods";
+            return Err(self.permanent(message).of(Fault::Compressed));
         }
         let range = text.and_then(ContentRange::parse).ok_or_else(|| {
-            self.transient(format!("the answer announces no usable range ({text:?})"))
+            let message = format!("the answer announces no usable range ({text:?})");
+            self.transient(message).of(Fault::WrongRange)
         })?;
         let wanted = ask.offset + ask.len;
         let complete = range.end == wanted
@@ -303,16 +371,18 @@ impl HttpSource {
             && total < wanted
             && !ask.may_end
         {
-            return Err(self.permanent(format!(
+            let message = format!(
                 "bytes {} to {wanted} are beyond the end of the file ({total} bytes): cut short",
                 ask.offset
-            )));
+            );
+            return Err(self.permanent(message).of(Fault::WrongRange));
         }
         if range.start != ask.offset || !complete {
-            return Err(self.transient(format!(
+            let message = format!(
                 "asked for bytes {} to {wanted}, the answer announces {} to {}",
                 ask.offset, range.start, range.end
-            )));
+            );
+            return Err(self.transient(message).of(Fault::WrongRange));
         }
         Ok(range)
     }
@@ -332,19 +402,23 @@ impl HttpSource {
     /// The error for an answer that is not 206.
     fn refuse(&self, response: &Response, ask: Ask) -> SourceError {
         let status = response.status();
-        match status {
+        let error = match status {
             StatusCode::OK => {
                 let found = Identity::of(response.headers(), None);
-                match self.inner.identity.get() {
+                return match self.inner.identity.get() {
                     Some(first) if first.differs_from(&found) => self.changed(),
                     // It can answer ranges: this was a bad moment, or a proxy's error page.
-                    Some(_) => self.transient("answered a range request with 200 this time"),
-                    None => self.permanent(
-                        "the host answers range requests with the whole file (status 200); nothing \
-                         was downloaded. Use a host or proxy that supports Range, such as \
-                         `lodestream serve`",
-                    ),
-                }
+                    Some(_) => self
+                        .transient("answered a range request with 200 this time")
+                        .of(Fault::WholeFile),
+                    None => self
+                        .permanent(
+                            "the host answers range requests with the whole file (status 200); \
+                             nothing was downloaded. Use a host or proxy that supports Range, such \
+                             as `lodestream serve`",
+                        )
+                        .of(Fault::WholeFile),
+                };
             }
             StatusCode::RANGE_NOT_SATISFIABLE => self.permanent(format!(
                 "bytes {} to {} are beyond the end of the file: it is empty or cut short",
@@ -362,18 +436,23 @@ impl HttpSource {
             }
             _ if status.is_server_error() => self.transient(format!("the host answered {status}")),
             _ => self.permanent(format!("the host answered {status}")),
-        }
+        };
+        error.of(Fault::Status(status.as_u16()))
     }
 
     fn classify(&self, error: &reqwest::Error) -> SourceError {
         if error.is_builder() || error.is_redirect() {
             return self.permanent(innermost(error));
         }
-        let what = if error.is_connect() { "no connection: " } else { "" };
+        let (what, fault) = match error.is_connect() {
+            true => ("no connection: ", Fault::NoConnection),
+            false => ("", Fault::BrokenOff),
+        };
         if error.is_timeout() {
-            return self.transient(format!("{what}the host is silent"));
+            let fault = if error.is_connect() { fault } else { Fault::Silent };
+            return self.transient(format!("{what}the host is silent")).of(fault);
         }
-        self.transient(format!("{what}{}", innermost(error)))
+        self.transient(format!("{what}{}", innermost(error))).of(fault)
     }
 
     fn changed(&self) -> SourceError {

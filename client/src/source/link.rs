@@ -22,6 +22,9 @@ const TURN_BYTES: u64 = 16 << 10;
 /// Bytes of payload in a packet.
 const PACKET_BYTES: u64 = 1460;
 
+/// A timer is late by less than this.
+const TIMER_SLACK: Duration = Duration::from_millis(10);
+
 /// What a link does.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LinkSpec {
@@ -125,6 +128,22 @@ impl Link {
     /// Takes as long as a request for `len` bytes from `offset` does; calls `arrived` with the bytes
     /// that came in each turn.
     pub(super) async fn carry(&self, offset: u64, len: u64, mut arrived: impl FnMut(u64) + Send) {
+        let mut passage = self.connect(offset).await;
+        // There and back: the propagation of both ways at once, which moves all turns alike.
+        sleep(self.spec.round_trip).await;
+        passage.begin();
+        let mut done = 0;
+        while done < len {
+            let bytes = TURN_BYTES.min(len - done);
+            passage.turn(bytes).await;
+            arrived(bytes);
+            done += bytes;
+        }
+        passage.end();
+    }
+
+    /// Takes a connection for a request for bytes from `offset`; a new one takes its handshake.
+    async fn connect(&self, offset: u64) -> Passage<'_> {
         let warm = {
             let mut state = self.state();
             let warm = state.idle > 0;
@@ -134,32 +153,15 @@ impl Link {
         if !warm {
             sleep(self.spec.round_trip).await;
         }
-        // There and back: the propagation of both ways at once, which moves all turns alike.
-        sleep(self.spec.round_trip).await;
-        let mut done = 0;
-        // Exact, while the timer has steps: what it is late does not add up.
-        let mut ready = Instant::now();
-        while done < len {
-            let bytes = TURN_BYTES.min(len - done);
-            let lost = self.lost(offset + done, bytes);
-            if lost > 0 {
-                ready += self.spec.round_trip;
-                sleep_until(ready).await;
-            }
-            let sent = self.spec.transmission(bytes + lost);
-            let end = {
-                let mut state = self.state();
-                let end = state.free_at.map_or(ready, |free| free.max(ready)) + sent;
-                state.free_at = Some(end);
-                end
-            };
-            sleep_until(end).await;
-            ready = end;
-            arrived(bytes);
-            done += bytes;
-        }
-        // A request that is broken off takes its connection with it.
-        self.state().idle += 1;
+        Passage { link: self, offset, ready: Instant::now() }
+    }
+
+    /// A request to a real host: takes the way there. Call [`Passage::arrive`] when the host has
+    /// answered.
+    pub(super) async fn depart(&self, offset: u64) -> Passage<'_> {
+        let passage = self.connect(offset).await;
+        sleep(self.spec.round_trip / 2).await;
+        passage
     }
 
     /// Bytes of a turn that have to be sent again.
@@ -175,6 +177,68 @@ impl Link {
             random.f64() < self.spec.loss
         });
         lost.count() as u64 * PACKET_BYTES
+    }
+}
+
+/// A request on its way over a link. One that is dropped takes its connection with it.
+#[derive(Debug)]
+pub(super) struct Passage<'a> {
+    link: &'a Link,
+    /// Of the next byte in the file.
+    offset: u64,
+    /// When the last turn had come. Exact, while the timer has steps: what it is late does not add up.
+    ready: Instant,
+}
+
+impl Passage<'_> {
+    fn begin(&mut self) {
+        self.ready = Instant::now();
+    }
+
+    /// The host has answered: takes the way back.
+    pub(super) async fn arrive(&mut self) {
+        sleep(self.link.spec.round_trip / 2).await;
+        self.begin();
+    }
+
+    /// A real host has delivered so many bytes: takes as long as the link needs for them.
+    pub(super) async fn pass(&mut self, bytes: u64) {
+        let now = Instant::now();
+        // Less is the timer's lateness, more is the host's.
+        if now.duration_since(self.ready) > TIMER_SLACK {
+            self.ready = now;
+        }
+        let mut left = bytes;
+        while left > 0 {
+            let turn = TURN_BYTES.min(left);
+            self.turn(turn).await;
+            left -= turn;
+        }
+    }
+
+    /// Waits for at most [`TURN_BYTES`].
+    async fn turn(&mut self, bytes: u64) {
+        let spec = self.link.spec;
+        let lost = self.link.lost(self.offset, bytes);
+        if lost > 0 {
+            self.ready += spec.round_trip;
+            sleep_until(self.ready).await;
+        }
+        let sent = spec.transmission(bytes + lost);
+        let end = {
+            let mut state = self.link.state();
+            let end = state.free_at.map_or(self.ready, |free| free.max(self.ready)) + sent;
+            state.free_at = Some(end);
+            end
+        };
+        sleep_until(end).await;
+        self.ready = end;
+        self.offset += bytes;
+    }
+
+    /// The answer is complete: its connection is free for the next.
+    pub(super) fn end(self) {
+        self.link.state().idle += 1;
     }
 }
 

@@ -10,16 +10,23 @@ const ACCEPTED: &str =
 
 /// See [`Source::parse`].
 pub fn parse(text: &str) -> Result<Source, SourceError> {
-    let url = if text.starts_with("http://") || text.starts_with("https://") {
-        dataset_url(text)?
+    match url(text)? {
+        Some(url) => Ok(Source::Http(HttpSource::new(url))),
+        None => FileSource::open(text).map(Source::File),
+    }
+}
+
+/// The URL that is named; `None` where it is a file.
+pub fn url(text: &str) -> Result<Option<Url>, SourceError> {
+    if text.starts_with("http://") || text.starts_with("https://") {
+        dataset_url(text).map(Some)
     } else if std::path::Path::new(text).exists() {
-        return FileSource::open(text).map(Source::File);
+        Ok(None)
     } else if is_server_address(text) {
-        dataset_url(&format!("http://{text}"))?
+        dataset_url(&format!("http://{text}")).map(Some)
     } else {
-        return Err(SourceError::permanent(text, format!("no such file; {ACCEPTED}")));
-    };
-    Ok(Source::Http(HttpSource::new(url)))
+        Err(SourceError::permanent(text, format!("no such file; {ACCEPTED}")))
+    }
 }
 
 /// Whether `text` reads `host:port` or `host:port/…`.

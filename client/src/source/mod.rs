@@ -10,13 +10,16 @@ mod backoff;
 mod blocking;
 mod connector;
 mod error;
+mod fault;
 mod file;
 mod http;
 mod link;
 mod linked;
 mod listing;
 mod locator;
+mod meter;
 mod token;
+mod wire;
 
 use std::sync::Arc;
 
@@ -26,14 +29,17 @@ use lodestream_protocol::BatchPart;
 pub use backoff::Backoff;
 pub use blocking::BlockingSource;
 pub(crate) use connector::Connections;
-pub use connector::Timeouts;
+pub use connector::{Timeouts, is_local};
 pub use error::SourceError;
+pub use fault::Fault;
 pub use file::FileSource;
 pub use http::HttpSource;
 pub use link::{Link, LinkSpec};
 pub use linked::LinkedSource;
 pub use listing::{datasets_of_folder, is_server, list_datasets};
+pub use meter::{Counted, Meter, Traffic};
 pub use token::use_token;
+pub use wire::Wire;
 
 /// Most bytes that are reserved before any of them has arrived.
 const RESERVE_BYTES: u64 = 4 << 20;
@@ -89,6 +95,27 @@ impl Source {
     /// [`SourceError::Permanent`] where the text names nothing that could be read.
     pub fn parse(text: &str) -> Result<Self, SourceError> {
         locator::parse(text)
+    }
+
+    /// A host's file whose requests go through `wire`, for measuring what they come to.
+    ///
+    /// # Errors
+    /// [`SourceError::Permanent`] where the text names no URL.
+    pub fn by_wire(text: &str, wire: Wire) -> Result<Self, SourceError> {
+        let url = Self::parse_url(text)?;
+        Ok(Self::Http(HttpSource::by_wire(url, Timeouts::default(), wire)))
+    }
+
+    /// The URL of a dataset that a user names, as [`parse`](Self::parse) takes it.
+    ///
+    /// # Errors
+    /// [`SourceError::Permanent`] where the text names no URL.
+    pub fn parse_url(text: &str) -> Result<reqwest::Url, SourceError> {
+        locator::url(text)?.ok_or_else(|| {
+            let message = "is a file: name the address of a host, as in 127.0.0.1:8080/NAME; \
+                           `lodestream serve FOLDER` is one";
+            SourceError::permanent(text, message)
+        })
     }
 
     /// The file behind a made-up link, for measuring what links do.

@@ -15,3 +15,4 @@ mod refinement;
 mod simulated;
 mod soak;
 mod sources;
+mod tasked;

@@ -30,8 +30,8 @@ pub fn dataset(seed: u8, tail: usize) -> Vec<u8> {
         bounds: LatticeBox::EMPTY,
         largest_rounding: 0.0,
         attributes: vec![color],
-        groups: vec![GroupInfo { name: "base".into(), columns: vec![0, 0] }],
         fine: None,
+        groups: vec![GroupInfo { name: "base".into(), columns: vec![0, 0] }],
         crs: None,
         sources: vec![],
     };

@@ -1,14 +1,6 @@
 //! What the benches of frames have in common: a dataset, its overview, and what that needs.
 
-use std::{
-    env,
-    error::Error,
-    ffi::OsStr,
-    path::{Path, PathBuf},
-    process::Command,
-    sync::Arc,
-    time::Duration,
-};
+use std::{error::Error, path::Path, sync::Arc, time::Duration};
 
 use glam::DVec3;
 use lodestream_client::{
@@ -17,22 +9,15 @@ use lodestream_client::{
     source::Source,
 };
 use lodestream_protocol::Manifest;
-use lodestream_tests::program;
+
+#[path = "dataset.rs"]
+mod dataset;
+
+pub use dataset::dataset;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 pub const SIZE_PX: [u32; 2] = [1280, 720];
-
-/// The dataset that `input` is, or the one that is built from it under that name.
-pub fn dataset(input: &OsStr, name: &str) -> Result<PathBuf> {
-    if Path::new(input).extension().is_some_and(|e| e == "lods") {
-        return Ok(input.into());
-    }
-    let dataset = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let mut build = Command::new(program("lodestream")?);
-    let status = build.arg("build").arg(input).arg("-o").arg(&dataset).status()?;
-    Ok(status.success().then_some(dataset).ok_or("the build failed")?)
-}
 
 pub fn camera(clouds: &[Arc<Manifest>]) -> Camera {
     let bounds = clouds.iter().find_map(|cloud| cloud.bounds_world());

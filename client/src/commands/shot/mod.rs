@@ -197,7 +197,7 @@ fn read_camera(path: &Path) -> anyhow::Result<Camera> {
     Camera::from_json(&text).with_context(name)
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected a size like 1280x720".into())
 }

@@ -6,25 +6,41 @@ use std::{
 };
 
 use bytes::Bytes;
-use lodestream_protocol::{Boot, DecodedGroup, Error, HierarchyPage, Manifest, decode_group};
+use lodestream_protocol::{Boot, Error, HierarchyPage, Manifest, check_group, decode_group};
 
-use super::super::piece::{Part, Piece};
+use super::super::{
+    config::Payloads,
+    event::Content,
+    piece::{Part, Piece},
+};
 
 /// A decoded piece.
 #[derive(Debug)]
 pub enum Decoded {
     Page(HierarchyPage),
-    Group(DecodedGroup),
+    Group(Content),
 }
 
 /// Decodes, and says how many nanoseconds that took.
-pub fn decode(piece: &Piece, boot: &Boot, bytes: &Bytes) -> (Result<Decoded, Error>, u64) {
+pub fn decode(
+    piece: &Piece,
+    boot: &Boot,
+    bytes: &Bytes,
+    payloads: Payloads,
+) -> (Result<Decoded, Error>, u64) {
     let begin = Instant::now();
     // A panic in a codec on damaged bytes would end the process from inside the pool.
     let result = catch_unwind(AssertUnwindSafe(|| match piece.id.part {
         Part::Page => boot.parse_child_page(bytes, &piece.node).map(Decoded::Page),
         Part::Group(group) => {
-            decode_group(&boot.manifest, group, &piece.node, bytes).map(Decoded::Group)
+            let content = match payloads {
+                Payloads::Decode => {
+                    decode_group(&boot.manifest, group, &piece.node, bytes).map(Content::Decoded)
+                }
+                Payloads::Count => check_group(&piece.node, group, bytes)
+                    .map(|()| Content::Counted(decoded_bytes(piece, &boot.manifest))),
+            };
+            content.map(Decoded::Group)
         }
     }));
     let result = result.unwrap_or_else(|_| {

@@ -12,7 +12,7 @@ use bytes::Bytes;
 use lodestream_protocol::BatchPart;
 use tokio::{sync::mpsc::UnboundedSender, task::AbortHandle, time::Instant};
 
-use crate::source::{Source, SourceError};
+use crate::source::{Fault, Source, SourceError};
 
 use super::{
     super::{piece::Piece, shared::Shared},
@@ -128,6 +128,13 @@ impl Flight {
     }
 }
 
+/// Whoever no longer holds a request does not want it.
+impl Drop for Flight {
+    fn drop(&mut self) {
+        self.abort();
+    }
+}
+
 /// What a request asks for.
 #[derive(Debug)]
 enum Ask {
@@ -190,7 +197,8 @@ struct End {
 impl Drop for End {
     fn drop(&mut self) {
         let result = self.result.take().unwrap_or_else(|| {
-            Err(SourceError::Transient { place: "request".into(), message: "broken off".into() })
+            let (place, message) = ("request".into(), "broken off".into());
+            Err(SourceError::Transient { place, message, fault: Fault::BrokenOff })
         });
         let _ = self.messages.send(Message::Finished { flight: self.id, result });
     }

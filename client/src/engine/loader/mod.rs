@@ -44,6 +44,7 @@ use self::{
     pieces::{PieceState, Pieces},
 };
 use super::{
+    commons::Commons,
     config::{EngineConfig, LoadOrder},
     event::Event,
     inbox::Demand,
@@ -117,6 +118,8 @@ pub(super) struct Loader {
     connections: Connections,
     /// Who asks a host for first bytes passes its gate; `None` is for files.
     gates: HashMap<Option<String>, Arc<Semaphore>>,
+    /// Where other engines may have the same index.
+    commons: Option<Arc<Commons>>,
     sender: UnboundedSender<Message>,
     receiver: UnboundedReceiver<Message>,
 }
@@ -140,6 +143,7 @@ impl Loader {
             decoders: None,
             connections: Connections::default(),
             gates: HashMap::new(),
+            commons: None,
             sender,
             receiver,
         }
@@ -158,6 +162,11 @@ impl Loader {
             .build()
             .map_err(std::io::Error::other)?;
         Ok(Self { decoders: Some(decoders), ..self })
+    }
+
+    /// The same, keeping what is equal in other engines once.
+    pub fn sharing(self, commons: Arc<Commons>) -> Self {
+        Self { commons: Some(commons), ..self }
     }
 
     /// Runs until the inbox says to end.
@@ -266,9 +275,13 @@ impl Loader {
         let Some(boot) = boot else { return };
         let size = decode::decoded_bytes(&piece, &boot.manifest);
         self.pieces.set(piece.id, PieceState::Decoding { bytes: size });
+        if piece.id.part == Part::Page {
+            self.shared.counters.page_bytes.add(piece.len);
+        }
         let (shared, sender) = (Arc::clone(&self.shared), self.sender.clone());
+        let payloads = self.config.payloads;
         let work = move || {
-            let (result, nanos) = decode::decode(&piece, &boot, &bytes);
+            let (result, nanos) = decode::decode(&piece, &boot, &bytes, payloads);
             shared.counters.decode_nanos.add(nanos);
             let _ = sender.send(Message::Decoded { piece: piece.id, result });
         };
@@ -287,8 +300,8 @@ impl Loader {
             Ok(decoded) => {
                 self.shared.counters.decoded_nodes.add(1);
                 match (decoded, id.part) {
-                    (Decoded::Group(decoded), Part::Group(group)) => {
-                        Event::Group { node: id.node, group, decoded }
+                    (Decoded::Group(content), Part::Group(group)) => {
+                        Event::Group { node: id.node, group, content }
                     }
                     (Decoded::Page(page), _) => {
                         Event::Page { cloud: id.node.cloud, parent: id.node.key, page }

@@ -11,7 +11,7 @@ use tokio::sync::Semaphore;
 
 use crate::source::{Announced, Backoff, Source, SourceError};
 
-use super::super::shared::Shared;
+use super::super::{commons::Commons, shared::Shared};
 
 /// What there is of a cloud's first bytes.
 #[derive(Debug)]
@@ -22,6 +22,16 @@ pub struct Opening {
     pub prefix: Bytes,
     /// How long the prefix will become.
     pub expected: u64,
+}
+
+impl Opening {
+    /// The same, keeping what is equal in other engines once.
+    pub fn shared(self, commons: &Commons) -> Self {
+        let boot = commons.boot(self.boot);
+        let is_whole = self.prefix.len() as u64 >= self.expected;
+        let prefix = if is_whole { commons.prefix(&boot, self.prefix) } else { self.prefix };
+        Self { boot, prefix, ..self }
+    }
 }
 
 /// How a cloud is opened.

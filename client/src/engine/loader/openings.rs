@@ -18,6 +18,13 @@ use super::{
 };
 use crate::source::{Backoff, Source, SourceError};
 
+/// Whoever no longer holds an opening does not want it.
+impl Drop for OpeningTask {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
+}
+
 /// Identifies an opening.
 pub type OpeningId = u64;
 
@@ -155,9 +162,7 @@ impl Loader {
     }
 
     fn stop_opening(&mut self, cloud: usize) {
-        for (_, opening) in self.openings.extract_if(|_, opening| opening.cloud == cloud) {
-            opening.task.abort();
-        }
+        self.openings.retain(|_, opening| opening.cloud != cloud);
     }
 
     pub(super) fn end_opening(&mut self, id: OpeningId) {
@@ -171,7 +176,10 @@ impl Loader {
     }
 
     /// More of a cloud's first bytes has come.
-    pub(super) fn take_opening(&mut self, id: OpeningId, source: Source, opening: Opening) {
+    pub(super) fn take_opening(&mut self, id: OpeningId, source: Source, mut opening: Opening) {
+        if let Some(commons) = &self.commons {
+            opening = opening.shared(commons);
+        }
         // One that was broken off is no longer there.
         let Some(cloud) = self.openings.get(&id).map(|opening| opening.cloud) else { return };
         let Some(known) = self.clouds.get_mut(&cloud) else { return };

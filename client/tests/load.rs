@@ -1,0 +1,293 @@
+//! `lodestream load`: the real binaries, real HTTP, and figures that are held to the server's own.
+
+#[path = "common/dataset.rs"]
+mod dataset;
+#[allow(dead_code, reason = "the engine's tests need more of it")]
+#[path = "common/host.rs"]
+mod host;
+
+use std::{
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Child, Command, Output, Stdio},
+    sync::mpsc::channel,
+    time::Duration,
+};
+
+use lodestream_client::{engine::Policy, load::LoadReport};
+
+use dataset::{Recipe, dataset, write};
+use host::{Answer, Host};
+
+/// Long enough for any machine; a test that waits this long has failed.
+const LONG: Duration = Duration::from_secs(120);
+
+/// A real server in a process of its own.
+struct Server {
+    process: Child,
+    url: String,
+}
+
+impl Server {
+    fn start(folder: &Path) -> Self {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_lodestream"))
+            .args(["serve", "--listen", "127.0.0.1:0"])
+            .arg(folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the binary runs");
+        let mut url = String::new();
+        let stdout = process.stdout.take().expect("piped");
+        BufReader::new(stdout).read_line(&mut url).expect("the address");
+        Self { process, url: url.trim().to_owned() }
+    }
+
+    fn dataset(&self) -> String {
+        format!("{}/dataset", self.url)
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+fn load(url: &str, folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lodestream"));
+    let output = folder.join("out");
+    command.args(["load", url, "-o"]).arg(output).args(["--ramp", "0"]).args(args);
+    command.output().expect("the binary runs")
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join("out").join(name)).expect(name)
+}
+
+fn report(folder: &Path) -> LoadReport {
+    let text = read(folder, "load.json");
+    let report: LoadReport = serde_json::from_str(&text).expect("a report");
+    assert_eq!(report.json(), text, "nothing is lost by reading");
+    report
+}
+
+fn expect_success(output: &Output) -> String {
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
+    said
+}
+
+/// Requests that a load test sends to find out where the dataset lies, before there are clients.
+fn opening(host: &Host) -> usize {
+    let before = host.requests().len();
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let output = load(&host.url(), folder.path(), &["--path", "orbit?seconds=5000"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && said.contains("1 to 3600 seconds"), "{said}");
+    host.requests().len() - before
+}
+
+fn recipe() -> Recipe {
+    Recipe { node_points: 2000, ..Recipe::default() }
+}
+
+#[test]
+fn the_figures_are_the_hosts_own() {
+    let file = dataset(recipe());
+    let host = Host::good(file.clone());
+    let opening = opening(&host);
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let args = ["--path", "teleport?seconds=4&stops=2", "--loops", "2", "--clients", "3"];
+    expect_success(&load(&host.url(), folder.path(), &args));
+    let report = report(folder.path());
+    let [run] = report.runs.as_slice() else { panic!("one run: {report:?}") };
+    assert_eq!((run.visits.begun, run.visits.complete, run.visits.failed), (6, 6, 0));
+    assert_eq!((run.errors, run.cold.first.came, run.jumps.first.came), (0, 6, 6), "{run:?}");
+    let seen = host.requests().split_off(2 * opening);
+    let bytes = |request: &host::Request| {
+        let (start, end) = request.range.expect("ranges only");
+        end.min(file.len() as u64) - start
+    };
+    let served: u64 = seen.iter().map(bytes).sum();
+    assert_eq!(run.requests.sent as usize, seen.len(), "{run:?}");
+    assert_eq!(run.requests.sent, run.requests.complete + run.requests.broken_off);
+    if run.requests.broken_off == 0 {
+        assert_eq!(run.bytes.received, served, "{run:?}");
+    }
+    assert!(run.bytes.received <= served && run.bytes.used <= run.bytes.received);
+    let summed: u64 = run.intervals.iter().map(|at| at.requests).sum();
+    assert_eq!(summed, run.requests.sent, "over time as in all");
+    let summed: u64 = run.intervals.iter().map(|at| at.bytes).sum();
+    assert_eq!(summed, run.bytes.received);
+    let summed: u64 = run.intervals.iter().map(|at| at.nodes.came + at.nodes.given_up).sum();
+    assert_eq!(summed, run.nodes.came + run.nodes.given_up);
+    assert!(run.nodes.p50_ms <= run.nodes.p99_ms);
+    assert!(run.cold.first.p50_ms <= run.cold.settled.p50_ms);
+}
+
+#[test]
+fn a_report_is_written_for_programs_for_people_and_for_the_terminal() {
+    let (folder, _) = write(&dataset(recipe()));
+    let server = Server::start(folder.path());
+    let args = ["--path", "orbit?seconds=2", "--loops", "1", "--clients", "2", "--keep-cache"];
+    let said = expect_success(&load(&server.dataset(), folder.path(), &args));
+    let report = report(folder.path());
+    let run = &report.runs[0];
+    assert!(run.nodes.came > 0 && run.bytes.received > 0, "{run:?}");
+    if cfg!(target_os = "linux") {
+        let process = run.server.as_ref().expect("seen by its port");
+        assert_eq!(process.pids, [server.process.id()]);
+        assert!(process.memory_peak_bytes > 1 << 20, "{process:?}");
+    }
+    assert!(said.contains("ours") && said.contains("load.html"), "{said}");
+    let html = read(folder.path(), "load.html");
+    assert!(html.contains("What each client waited for") && !html.contains("NaN"));
+    for name in ["runs.csv", "latency.csv", "intervals.csv"] {
+        let table = read(folder.path(), name);
+        let columns = |line: &str| line.split(',').count();
+        let first = table.lines().next().map(columns);
+        assert!(table.lines().count() >= 2, "{name}");
+        assert!(table.lines().all(|line| Some(columns(line)) == first), "{name}");
+    }
+    assert_eq!(read(folder.path(), "errors.csv").lines().count(), 1);
+}
+
+#[test]
+fn rivals_policies_are_told_as_ratios_and_more_clients_as_a_knee() {
+    let (folder, _) = write(&dataset(recipe()));
+    let server = Server::start(folder.path());
+    let path = ["--path", "teleport?seconds=2&stops=2", "--loops", "1", "--clients", "1,2,3"];
+    let policies = ["--policy", "ours,potree", "--link", "100mbit/10ms"];
+    let said =
+        expect_success(&load(&server.dataset(), folder.path(), &[&path[..], &policies].concat()));
+    let report = report(folder.path());
+    assert_eq!((report.runs.len(), report.ratios.len(), report.knees.len()), (6, 3, 2));
+    for run in &report.runs {
+        // Handshake, request and answer.
+        assert!(run.cold.first.p50_ms >= Some(20.0), "the link delays: {run:?}");
+    }
+    let requests_per_node = |policy| {
+        let runs = report.runs.iter().filter(move |run| run.policy == policy);
+        let sums = runs.map(|run| (run.requests.sent, run.nodes.came));
+        let (requests, nodes) = sums.fold((0, 0), |sum, run| (sum.0 + run.0, sum.1 + run.1));
+        requests as f64 / nodes as f64
+    };
+    let (ours, potree) = (requests_per_node(Policy::Ours), requests_per_node(Policy::Potree));
+    assert!(potree > 2.0 * ours, "a request for every node: {potree}, ours {ours}");
+    assert!(said.contains("potree against ours, 1 client, cold"), "{said}");
+    assert!(said.contains("the knee is at"), "{said}");
+}
+
+#[test]
+fn a_host_that_dies_midway_gives_errors_by_kind_and_a_failure() {
+    let (sender, requests) = channel();
+    let mut host = Host::start(dataset(recipe()), move |request| {
+        // The test is over before its host.
+        let _ = sender.send(request.number);
+        Answer::Good
+    });
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (url, path) = (host.url(), folder.path().to_owned());
+    let args = ["--path", "orbit?seconds=1", "--duration", "4", "--clients", "4"];
+    let loading = std::thread::spawn(move || load(&url, &path, &args));
+    // It is under way once the clients have asked for something.
+    for _ in 0..10 {
+        requests.recv_timeout(LONG).expect("requests");
+    }
+    host.stop();
+    let output = loading.join().expect("no panic");
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let report = report(folder.path());
+    let run = &report.runs[0];
+    assert!(run.errors > 0 && run.errors_by_kind.contains_key("no connection"), "{run:?}");
+    assert_eq!(run.errors, run.errors_by_kind.values().sum::<u64>());
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("no connection"), "{said}");
+    assert!(read(folder.path(), "load.html").contains("What went wrong"));
+    assert!(read(folder.path(), "errors.csv").contains("no connection"));
+}
+
+#[test]
+fn kinds_of_failure_are_told_apart() {
+    let host = Host::start(dataset(recipe()), |request| match request.number {
+        0 => Answer::Good,
+        n if n % 5 == 1 => Answer::Status(503),
+        n if n % 5 == 2 => Answer::CutShort { share: 0.5 },
+        n if n % 5 == 3 => Answer::WrongRange,
+        _ => Answer::Good,
+    });
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let args = ["--path", "orbit?seconds=3", "--loops", "1", "--clients", "3"];
+    let output = load(&host.url(), folder.path(), &args);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let run = &report(folder.path()).runs[0];
+    for kind in ["status 503", "broken off", "wrong range"] {
+        assert!(run.errors_by_kind.contains_key(kind), "{kind}: {:?}", run.errors_by_kind);
+    }
+    assert!(run.nodes.came > 0, "engines go on");
+}
+
+#[test]
+fn what_never_came_is_not_forgotten() {
+    let file = dataset(recipe());
+    let (reached, _hangs) = tokio::sync::mpsc::unbounded_channel();
+    // Two for the opening and for the client's; everything else hangs.
+    let host = Host::start(file, move |request| match request.range {
+        Some((0, _)) => Answer::Good,
+        _ => Answer::Hang { share: 0.5, reached: reached.clone() },
+    });
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let args = ["--path", "orbit?seconds=2", "--loops", "1", "--clients", "1"];
+    let output = load(&host.url(), folder.path(), &args);
+    let report = report(folder.path());
+    let run = &report.runs[0];
+    assert_eq!(run.errors, 0, "a slow host is no error: {output:?}");
+    assert!(run.nodes.given_up > 0 && run.nodes.p999_ms.is_none(), "{run:?}");
+    assert_eq!((run.cold.settled.came, run.cold.settled.given_up), (0, 1));
+    assert!(run.requests.broken_off > 0 && run.bytes.wasted_share > 0.0, "{run:?}");
+}
+
+#[test]
+fn a_run_is_bounded_in_requests_clients_and_time() {
+    let host = Host::good(dataset(recipe()));
+    let opening = opening(&host);
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let url = host.url();
+    let spent = ["--path", "orbit?seconds=2", "--duration", "60", "--most-requests", "40"];
+    let output = load(&url, folder.path(), &[&spent[..], &["--clients", "20"]].concat());
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let report = report(folder.path());
+    let run = &report.runs[0];
+    assert_eq!(
+        (run.requests.sent, run.cut_short.as_deref(), run.errors),
+        (40, Some("requests"), 0)
+    );
+
+    let refused = |args: &[&str], word: &str| {
+        let output = load(&url, folder.path(), args);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{args:?}: {said}");
+        assert!(said.starts_with("error: ") && said.contains(word), "{args:?}: {said}");
+    };
+    refused(&["--clients", "0"], "1 to 10000");
+    refused(&["--clients", "10001"], "1 to 10000");
+    refused(&["--duration", "3601"], "3600");
+    refused(&["--path", "nowhere.json"], "no such file");
+    refused(&["--views-per-second", "0"], "0.1 to 120");
+    assert_eq!(host.requests().len(), 40 + 2 * opening, "what is refused asks for nothing");
+}
+
+#[test]
+fn what_cannot_be_loaded_is_refused_with_advice() {
+    let (folder, path) = write(&dataset(recipe()));
+    let refused = |url: &str, word: &str| {
+        let output = load(url, folder.path(), &["--duration", "1"]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && said.contains(word), "{url}: {said}");
+    };
+    refused(&path.display().to_string(), "lodestream serve");
+    let server = Server::start(folder.path());
+    refused(&format!("{}/nothing", server.url), "not found");
+}
