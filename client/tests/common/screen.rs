@@ -231,6 +231,11 @@ impl<'a> Window<'a> {
         })
     }
 
+    /// Waits until a widget is there.
+    pub fn see(&self, role: &str, label: &str) {
+        self.widget(role, label);
+    }
+
     /// Whether a widget is there at the moment.
     pub fn has_widget(&self, role: &str, label: &str) -> bool {
         let told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -249,7 +254,7 @@ impl<'a> Window<'a> {
     pub fn click_at(&mut self, x: i64, y: i64, times: u32) {
         let [x, y, times] = [x.to_string(), y.to_string(), times.to_string()];
         self.screen.hand(&["mousemove", &x, &y, "sleep", "0.05"]);
-        self.screen.hand(&["click", "--repeat", &times, "--delay", "40", "1"]);
+        self.screen.hand(&["click", "--repeat", &times, "--delay", "10", "1"]);
     }
 
     /// Turns the wheel at a place: 4 is ahead, 5 is back.

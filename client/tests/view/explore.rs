@@ -83,11 +83,11 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     let mut world = World::of("sim:courtyard?points=1M&seed=3");
     let source = world.source();
     let folder = world.file("out");
-    let screen = Screen::new(1280, 800);
+    let screen = Screen::new(1280, 900);
     let photographs = screenshots();
     let photograph = |name: &str| screen.write(&photographs.join(name));
     let mut arguments = vec![source.as_str(), "--folder", &folder, "--settings", "-"];
-    arguments.extend(["--size", "1280x800", "--budget", BUDGET, "--theme", "dark"]);
+    arguments.extend(["--size", "1280x900", "--budget", BUDGET, "--theme", "dark"]);
     arguments.extend(LOOK);
     let mut window = Window::open(&screen, PROGRAM, &arguments);
 
@@ -202,6 +202,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     // A second cloud, typed into the dialog.
     world.add("sim:courtyard?points=20k&seed=5", "second");
     window.keys(&["ctrl+o"]);
+    window.see("Label", "A file, a folder, a URL, or a server and a dataset");
     window.text(&world.file("second.lods"));
     window.keys(&["Return"]);
     let opened = window.wait("opened", |event| event["cloud"] == 1);
