@@ -245,9 +245,19 @@ impl<'a> Window<'a> {
 
     /// Clicks a widget.
     pub fn press(&mut self, role: &str, label: &str) {
-        let [x, y] = self.widget(role, label);
+        // Sections of the panel open smoothly: a hand follows what moves.
+        let mut at = self.widget(role, label);
+        loop {
+            let [x, y] = at.map(|c| c.to_string());
+            self.screen.hand(&["mousemove", &x, &y, "sleep", "0.15"]);
+            let now = self.widget(role, label);
+            if now == at {
+                break;
+            }
+            at = now;
+        }
         self.from_now();
-        self.click_at(x, y, 1);
+        self.click_at(at[0], at[1], 1);
     }
 
     /// Clicks a place of the window so many times.

@@ -85,7 +85,11 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     let folder = world.file("out");
     let screen = Screen::new(1280, 900);
     let photographs = screenshots();
-    let photograph = |name: &str| screen.write(&photographs.join(name));
+    // What is drawn last is on the screen a moment later.
+    let photograph = |name: &str| {
+        screen.hand(&["sleep", "0.6"]);
+        screen.write(&photographs.join(name));
+    };
     let mut arguments = vec![source.as_str(), "--folder", &folder, "--settings", "-"];
     arguments.extend(["--size", "1280x900", "--budget", BUDGET, "--theme", "dark"]);
     arguments.extend(LOOK);
