@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{display::Display, filter::Wanted, jobs::Answer, viewer::Viewer};
+use super::{display::Display, filter::Wanted, jobs::Answer, state::Viewer};
 use crate::{
     camera::Camera,
     engine::View,
@@ -113,7 +113,7 @@ impl Viewer {
             self.tell_settled();
         }
         self.take_pictures(display, is_settled)?;
-        Ok(self.last.is_partial || moves && !(self.export.is_some() && !is_settled))
+        Ok(self.last.is_partial || moves && (self.export.is_none() || is_settled))
     }
 
     /// Whether a column group of a cloud is fetched for this view.

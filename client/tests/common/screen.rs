@@ -169,7 +169,7 @@ impl<'a> Window<'a> {
     }
 
     /// From here on, only what is told later counts.
-    pub fn from_now(&mut self) {
+    pub fn forget_past(&mut self) {
         self.now = self.told.0.lock().unwrap_or_else(PoisonError::into_inner).events.len();
     }
 
@@ -211,7 +211,7 @@ impl<'a> Window<'a> {
 
     /// Presses keys, each once.
     pub fn keys(&mut self, keys: &[&str]) {
-        self.from_now();
+        self.forget_past();
         self.screen.hand(&[&["key", "--delay", PACE_MS], keys].concat());
     }
 
@@ -256,7 +256,7 @@ impl<'a> Window<'a> {
             }
             at = now;
         }
-        self.from_now();
+        self.forget_past();
         self.click_at(at[0], at[1], 1);
     }
 
@@ -269,7 +269,7 @@ impl<'a> Window<'a> {
 
     /// Turns the wheel at a place: 4 is ahead, 5 is back.
     pub fn wheel(&mut self, x: i64, y: i64, button: u32, turns: u32) {
-        self.from_now();
+        self.forget_past();
         let [x, y, button, turns] =
             [x, y, i64::from(button), i64::from(turns)].map(|n| n.to_string());
         self.screen.hand(&["mousemove", &x, &y, "sleep", "0.05"]);
@@ -278,7 +278,7 @@ impl<'a> Window<'a> {
 
     /// Drags with a button from a place, in ten steps.
     pub fn drag(&mut self, button: u32, from: [i64; 2], step: [i64; 2]) {
-        self.from_now();
+        self.forget_past();
         let [x, y, dx, dy, button] =
             [from[0], from[1], step[0], step[1], i64::from(button)].map(|n| n.to_string());
         self.screen.hand(&["mousemove", &x, &y, "sleep", "0.05", "mousedown", &button]);
@@ -290,13 +290,13 @@ impl<'a> Window<'a> {
 
     /// Holds a key for some time.
     pub fn hold(&mut self, key: &str, seconds: &str) {
-        self.from_now();
+        self.forget_past();
         self.screen.hand(&["keydown", key, "sleep", seconds, "keyup", key]);
     }
 
     /// Another size of the window.
     pub fn resize(&mut self, width: u32, height: u32) {
-        self.from_now();
+        self.forget_past();
         let [width, height] = [width.to_string(), height.to_string()];
         self.screen.hand(&["search", "--name", "^lodestream$", "windowsize", &width, &height]);
     }

@@ -100,9 +100,9 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     assert_eq!(opened["points"], 1_000_000);
     let first = window.settled();
     let look = [&LOOK[..], &["--budget", BUDGET]].concat();
+    photograph("overview.png");
     let picture = window.picture();
     compare(&world, &picture, &look);
-    photograph("overview.png");
 
     // Orbit: the eye moves around the target, at the same distance.
     let [x, y] = middle(&first);
@@ -128,7 +128,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     compare(&world, &picture, &look);
 
     // Pick: a point of the dataset, to the last digit, with all its values.
-    window.from_now();
+    window.forget_past();
     window.click_at(x, y, 1);
     let picked = window.wait("picked", |event| event["cloud"] == 0);
     let values = window.wait("values", |event| !event["values"].is_null());
@@ -144,7 +144,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     photograph("picked.png");
 
     // A double click sets the pivot: the camera looks at that very point.
-    window.from_now();
+    window.forget_past();
     window.click_at(x, y, 2);
     let pivoted =
         window.wait("settled", |event| distance(target(event), place(&picked["world"])) < 1e-9);
@@ -164,7 +164,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     window.keys(&["m"]);
     window.click_at(x - 60, y + 40, 1);
     window.wait("picked", |event| event["cloud"] == 0);
-    window.from_now();
+    window.forget_past();
     window.click_at(x + 70, y + 20, 1);
     let measured = window.wait("measured", |_| true);
     assert!(measured["distance"].as_f64() > Some(0.0), "{measured}");
@@ -219,7 +219,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     window.keys(&["n", "n"]);
     window.wait("cloud", |event| event["cloud"] == 0 && event["trouble"].is_string());
     photograph("trouble.png");
-    window.from_now();
+    window.forget_past();
     world.restart_server();
     window.wait("cloud", |event| event["cloud"] == 0 && event["trouble"].is_null());
     window.settled();
