@@ -19,7 +19,7 @@ fn every_node_is_found_by_its_key_whatever_page_it_is_in() {
         let missing = (0..8)
             .filter_map(|octant| NodeKey::ROOT.child(octant))
             .find(|key| nodes.iter().all(|node| node.key != *key));
-        for key in missing {
+        if let Some(key) = missing {
             assert_eq!(dataset.node(key).expect("readable"), None);
             let below = key.child(3).expect("a child");
             assert_eq!(dataset.node(below).expect("readable"), None);

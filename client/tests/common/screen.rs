@@ -249,7 +249,7 @@ impl<'a> Window<'a> {
         let mut at = self.widget(role, label);
         loop {
             let [x, y] = at.map(|c| c.to_string());
-            self.screen.hand(&["mousemove", &x, &y, "sleep", "0.15"]);
+            self.screen.hand(&["mousemove", &x, &y, "sleep", "0.4"]);
             let now = self.widget(role, label);
             if now == at {
                 break;
@@ -258,6 +258,47 @@ impl<'a> Window<'a> {
         }
         self.forget_past();
         self.click_at(at[0], at[1], 1);
+    }
+
+    /// Chooses an entry of a list that folds out. Where another list is still folding in, the first click
+    /// only closes that: a hand clicks again.
+    pub fn choose(&mut self, list: &str, entry: &str) {
+        for _ in 0..10 {
+            self.press("ComboBox", list);
+            let end = Instant::now() + Duration::from_secs(3);
+            while Instant::now() < end {
+                if self.has_widget("Button", entry) {
+                    self.press("Button", entry);
+                    return;
+                }
+                self.screen.hand(&["sleep", "0.05"]);
+            }
+        }
+        panic!("{list:?} does not fold out to {entry:?}");
+    }
+
+    /// Clicks a widget until an event tells that it was hit: one that still moves may be missed.
+    pub fn press_until(
+        &mut self,
+        label: &str,
+        name: &str,
+        is_it: impl Fn(&Value) -> bool,
+    ) -> Value {
+        let before = self.told.0.lock().unwrap_or_else(PoisonError::into_inner).events.len();
+        for _ in 0..8 {
+            self.press("Button", label);
+            let end = Instant::now() + Duration::from_secs(5);
+            while Instant::now() < end {
+                let told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut news = told.events.iter().skip(before);
+                if let Some(event) = news.find(|event| event["event"] == name && is_it(event)) {
+                    return event.clone();
+                }
+                drop(told);
+                self.screen.hand(&["sleep", "0.05"]);
+            }
+        }
+        panic!("pressing {label:?} does not lead to {name}");
     }
 
     /// Clicks a place of the window so many times.

@@ -25,7 +25,7 @@ const BUDGET: &str = "400000";
 const LOOK: [&str; 8] =
     ["--splat", "circle", "--splat-size", "adaptive:1.6", "--min-splat", "2", "--max-splat", "8"];
 
-fn eye(event: &Value) -> [f64; 3] {
+pub fn eye(event: &Value) -> [f64; 3] {
     place(&event["camera"]["eye"])
 }
 
@@ -33,7 +33,7 @@ fn place(value: &Value) -> [f64; 3] {
     std::array::from_fn(|axis| value[axis].as_f64().expect("a number"))
 }
 
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -172,10 +172,8 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     window.keys(&["m"]);
 
     // Another splat and another colour, by the panel.
-    window.press("ComboBox", "circle");
-    window.press("Button", "square");
-    window.press("ComboBox", "rgb");
-    window.press("Button", "elevation");
+    window.choose("circle", "square");
+    window.choose("rgb", "elevation");
     window.keys(&["f"]);
     window.settled();
     let picture = window.picture();
@@ -187,9 +185,8 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     // Clip: fewer points, and all of them inside.
     let before = window.last_settled();
     window.keys(&["c"]);
-    window.press("Button", "Around the point");
-    let clipped =
-        window.wait("settled", |event| event["points"].as_u64() < before["points"].as_u64());
+    let is_less = |event: &Value| event["points"].as_u64() < before["points"].as_u64();
+    let clipped = window.press_until("Around the point", "settled", is_less);
     assert!(clipped["points"].as_u64() > Some(0), "{clipped}");
     photograph("clipped.png");
     window.keys(&["c"]);
