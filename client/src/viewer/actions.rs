@@ -12,7 +12,7 @@ use super::{
     recording::Recorder,
     session::Bookmark,
     settings::Theme,
-    viewer::{Clip, Tool, Viewer},
+    state::{Clip, Tool, Viewer},
 };
 use crate::{
     engine::ClipBox,

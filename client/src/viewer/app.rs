@@ -24,8 +24,9 @@ use winit::{
 use super::{
     display::{Display, DisplayError},
     options::{ViewOptions, ViewRenderer},
-    panel, theme,
-    viewer::Viewer,
+    panel,
+    state::Viewer,
+    theme,
 };
 use crate::render::GpuConfig;
 

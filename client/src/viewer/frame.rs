@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{display::Display, filter::Wanted, jobs::Answer, viewer::Viewer};
+use super::{display::Display, filter::Wanted, jobs::Answer, state::Viewer};
 use crate::{
     camera::Camera,
     engine::View,
@@ -27,7 +27,10 @@ pub struct LastPicture {
     attributes: Vec<String>,
     limits: Option<(u64, f64, u64)>,
     clip: Option<crate::engine::ClipBox>,
-    told_settled: Option<(u64, u64)>,
+    /// Counts pictures.
+    pictures: u64,
+    /// The last that was told to be complete.
+    told: u64,
 }
 
 impl Viewer {
@@ -98,6 +101,7 @@ impl Viewer {
             self.statistics = display.draw(&scene, &settings, CloudColors(&colors))?;
             self.frame_times.note(begin.elapsed());
             self.last.is_partial = self.statistics.waiting_nodes > 0;
+            self.last.pictures += 1;
             self.last.settings = Some(settings);
             self.last.colors = colors;
             self.last.plan = plan.sequence;
@@ -109,7 +113,7 @@ impl Viewer {
             self.tell_settled();
         }
         self.take_pictures(display, is_settled)?;
-        Ok(self.last.is_partial || moves && !(self.export.is_some() && !is_settled))
+        Ok(self.last.is_partial || moves && (self.export.is_none() || is_settled))
     }
 
     /// Whether a column group of a cloud is fetched for this view.
@@ -169,12 +173,9 @@ impl Viewer {
     }
 
     fn tell_settled(&mut self) {
-        let which = (self.plan.sequence, self.last.wishes);
-        if self.last.told_settled == Some(which) {
-            return;
-        }
-        self.last.told_settled = Some(which);
-        if !self.events.is_on() {
+        if std::mem::replace(&mut self.last.told, self.last.pictures) == self.last.pictures
+            || !self.events.is_on()
+        {
             return;
         }
         let camera: serde_json::Value =

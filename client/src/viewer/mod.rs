@@ -6,7 +6,7 @@
 //! ([`jobs`]). It draws on demand: input, a new plan or something that moves wakes it; at rest it sleeps.
 //!
 //! - `app.rs`: the event loop; `display.rs`: the window, the GPU, what shows pictures in it;
-//! - `viewer.rs`: what the program knows; `frame.rs`: from a plan to a picture; `view.rs`: the part of the
+//! - `state.rs`: what the program knows; `frame.rs`: from a plan to a picture; `view.rs`: the part of the
 //!   window that shows it, and what hands do there; `actions.rs`: what keys and buttons do;
 //! - `navigation.rs`, `filter.rs`, `picking.rs`, `point_values.rs`, `measurement.rs`, `recording.rs`, `export.rs`:
 //!   each one ability, none of which needs a window;
@@ -39,10 +39,10 @@ mod point_values;
 mod recording;
 mod session;
 mod settings;
+mod state;
 mod stored;
 mod theme;
 mod view;
-mod viewer;
 
 pub use app::run;
 pub use look::Look;

@@ -366,7 +366,8 @@ impl Navigator {
         let nearest = 1e-9 * (1.0 + anchor.abs().max_element());
         let farthest = 1e3 * (self.extent.1 - self.extent.0).length().max(1e-3)
             + (before.pivot - 0.5 * (self.extent.0 + self.extent.1)).length();
-        if !(goal.distance > nearest && goal.distance < farthest) || !goal.is_possible() {
+        let is_near_enough = goal.distance > nearest && goal.distance < farthest;
+        if !(is_near_enough && goal.is_possible()) {
             *goal = before;
         }
         self.is_chosen = true;

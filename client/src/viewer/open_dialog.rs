@@ -5,7 +5,7 @@ use std::path::Path;
 use egui::{Align2, RichText, ScrollArea};
 use lodestream_server::DatasetIndex;
 
-use super::{numbers, theme::Palette, viewer::Viewer};
+use super::{numbers, state::Viewer, theme::Palette};
 
 /// What the dialog shows.
 #[derive(Debug, Clone, Default)]

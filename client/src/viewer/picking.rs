@@ -67,7 +67,7 @@ pub fn pick(
 fn decimals(lattice: &Lattice) -> Option<usize> {
     let is_whole = |number: f64, power: f64| {
         let scaled = number * power;
-        (scaled - scaled.round()).abs() <= 1e-6 * scaled.abs().max(1.0).min(1e3)
+        (scaled - scaled.round()).abs() <= 1e-6 * scaled.abs().clamp(1.0, 1e3)
     };
     (0..=12)
         .find(|decimals| {

@@ -165,7 +165,6 @@ mod tests {
         for text in [
             "",
             "{",
-            "[]",
             "\u{0}\u{1}",
             r#"{"theme":"pink"}"#,
             r#"{"point_budget":1}"#,

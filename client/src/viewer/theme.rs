@@ -59,6 +59,8 @@ pub fn apply(context: &egui::Context, theme: Theme) {
         },
         visuals(theme),
     );
+    // As desktops have it: where frames take long, 0.3 s are over before the second click is seen.
+    context.options_mut(|options| options.input_options.max_double_click_delay = 0.5);
     context.all_styles_mut(|style| {
         let text = |size| FontId::new(size, FontFamily::Proportional);
         style.text_styles = [

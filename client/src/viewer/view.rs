@@ -7,8 +7,8 @@ use super::{
     navigation::{Mode, Walk},
     overlay,
     picking::{self, Picked},
+    state::Viewer,
     theme::Palette,
-    viewer::Viewer,
 };
 use crate::render::LARGEST_SIDE_PX;
 

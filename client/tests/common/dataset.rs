@@ -76,6 +76,7 @@ pub fn dataset(recipe: Recipe) -> Vec<u8> {
     file
 }
 
+#[allow(dead_code, reason = "each of its users needs a part of it")]
 /// Writes `bytes` to a file of its own that lives as long as the returned folder.
 pub fn write(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("temporary folder");

@@ -169,7 +169,7 @@ impl<'a> Window<'a> {
     }
 
     /// From here on, only what is told later counts.
-    pub fn from_now(&mut self) {
+    pub fn forget_past(&mut self) {
         self.now = self.told.0.lock().unwrap_or_else(PoisonError::into_inner).events.len();
     }
 
@@ -211,7 +211,7 @@ impl<'a> Window<'a> {
 
     /// Presses keys, each once.
     pub fn keys(&mut self, keys: &[&str]) {
-        self.from_now();
+        self.forget_past();
         self.screen.hand(&[&["key", "--delay", PACE_MS], keys].concat());
     }
 
@@ -231,6 +231,11 @@ impl<'a> Window<'a> {
         })
     }
 
+    /// Waits until a widget is there.
+    pub fn see(&self, role: &str, label: &str) {
+        self.widget(role, label);
+    }
+
     /// Whether a widget is there at the moment.
     pub fn has_widget(&self, role: &str, label: &str) -> bool {
         let told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -240,21 +245,72 @@ impl<'a> Window<'a> {
 
     /// Clicks a widget.
     pub fn press(&mut self, role: &str, label: &str) {
-        let [x, y] = self.widget(role, label);
-        self.from_now();
-        self.click_at(x, y, 1);
+        // Sections of the panel open smoothly: a hand follows what moves.
+        let mut at = self.widget(role, label);
+        loop {
+            let [x, y] = at.map(|c| c.to_string());
+            self.screen.hand(&["mousemove", &x, &y, "sleep", "0.4"]);
+            let now = self.widget(role, label);
+            if now == at {
+                break;
+            }
+            at = now;
+        }
+        self.forget_past();
+        self.click_at(at[0], at[1], 1);
+    }
+
+    /// Chooses an entry of a list that folds out. Where another list is still folding in, the first click
+    /// only closes that: a hand clicks again.
+    pub fn choose(&mut self, list: &str, entry: &str) {
+        for _ in 0..10 {
+            self.press("ComboBox", list);
+            let end = Instant::now() + Duration::from_secs(3);
+            while Instant::now() < end {
+                if self.has_widget("Button", entry) {
+                    self.press("Button", entry);
+                    return;
+                }
+                self.screen.hand(&["sleep", "0.05"]);
+            }
+        }
+        panic!("{list:?} does not fold out to {entry:?}");
+    }
+
+    /// Clicks a widget until an event tells that it was hit: one that still moves may be missed.
+    pub fn press_until(
+        &mut self,
+        label: &str,
+        name: &str,
+        is_it: impl Fn(&Value) -> bool,
+    ) -> Value {
+        let before = self.told.0.lock().unwrap_or_else(PoisonError::into_inner).events.len();
+        for _ in 0..8 {
+            self.press("Button", label);
+            let end = Instant::now() + Duration::from_secs(5);
+            while Instant::now() < end {
+                let told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut news = told.events.iter().skip(before);
+                if let Some(event) = news.find(|event| event["event"] == name && is_it(event)) {
+                    return event.clone();
+                }
+                drop(told);
+                self.screen.hand(&["sleep", "0.05"]);
+            }
+        }
+        panic!("pressing {label:?} does not lead to {name}");
     }
 
     /// Clicks a place of the window so many times.
     pub fn click_at(&mut self, x: i64, y: i64, times: u32) {
         let [x, y, times] = [x.to_string(), y.to_string(), times.to_string()];
         self.screen.hand(&["mousemove", &x, &y, "sleep", "0.05"]);
-        self.screen.hand(&["click", "--repeat", &times, "--delay", "40", "1"]);
+        self.screen.hand(&["click", "--repeat", &times, "--delay", "10", "1"]);
     }
 
     /// Turns the wheel at a place: 4 is ahead, 5 is back.
     pub fn wheel(&mut self, x: i64, y: i64, button: u32, turns: u32) {
-        self.from_now();
+        self.forget_past();
         let [x, y, button, turns] =
             [x, y, i64::from(button), i64::from(turns)].map(|n| n.to_string());
         self.screen.hand(&["mousemove", &x, &y, "sleep", "0.05"]);
@@ -263,7 +319,7 @@ impl<'a> Window<'a> {
 
     /// Drags with a button from a place, in ten steps.
     pub fn drag(&mut self, button: u32, from: [i64; 2], step: [i64; 2]) {
-        self.from_now();
+        self.forget_past();
         let [x, y, dx, dy, button] =
             [from[0], from[1], step[0], step[1], i64::from(button)].map(|n| n.to_string());
         self.screen.hand(&["mousemove", &x, &y, "sleep", "0.05", "mousedown", &button]);
@@ -275,13 +331,13 @@ impl<'a> Window<'a> {
 
     /// Holds a key for some time.
     pub fn hold(&mut self, key: &str, seconds: &str) {
-        self.from_now();
+        self.forget_past();
         self.screen.hand(&["keydown", key, "sleep", seconds, "keyup", key]);
     }
 
     /// Another size of the window.
     pub fn resize(&mut self, width: u32, height: u32) {
-        self.from_now();
+        self.forget_past();
         let [width, height] = [width.to_string(), height.to_string()];
         self.screen.hand(&["search", "--name", "^lodestream$", "windowsize", &width, &height]);
     }

@@ -25,7 +25,7 @@ const BUDGET: &str = "400000";
 const LOOK: [&str; 8] =
     ["--splat", "circle", "--splat-size", "adaptive:1.6", "--min-splat", "2", "--max-splat", "8"];
 
-fn eye(event: &Value) -> [f64; 3] {
+pub fn eye(event: &Value) -> [f64; 3] {
     place(&event["camera"]["eye"])
 }
 
@@ -33,7 +33,7 @@ fn place(value: &Value) -> [f64; 3] {
     std::array::from_fn(|axis| value[axis].as_f64().expect("a number"))
 }
 
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -83,11 +83,15 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     let mut world = World::of("sim:courtyard?points=1M&seed=3");
     let source = world.source();
     let folder = world.file("out");
-    let screen = Screen::new(1280, 800);
+    let screen = Screen::new(1280, 900);
     let photographs = screenshots();
-    let photograph = |name: &str| screen.write(&photographs.join(name));
+    // What is drawn last is on the screen a moment later.
+    let photograph = |name: &str| {
+        screen.hand(&["sleep", "0.6"]);
+        screen.write(&photographs.join(name));
+    };
     let mut arguments = vec![source.as_str(), "--folder", &folder, "--settings", "-"];
-    arguments.extend(["--size", "1280x800", "--budget", BUDGET, "--theme", "dark"]);
+    arguments.extend(["--size", "1280x900", "--budget", BUDGET, "--theme", "dark"]);
     arguments.extend(LOOK);
     let mut window = Window::open(&screen, PROGRAM, &arguments);
 
@@ -96,9 +100,9 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     assert_eq!(opened["points"], 1_000_000);
     let first = window.settled();
     let look = [&LOOK[..], &["--budget", BUDGET]].concat();
+    photograph("overview.png");
     let picture = window.picture();
     compare(&world, &picture, &look);
-    photograph("overview.png");
 
     // Orbit: the eye moves around the target, at the same distance.
     let [x, y] = middle(&first);
@@ -124,7 +128,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     compare(&world, &picture, &look);
 
     // Pick: a point of the dataset, to the last digit, with all its values.
-    window.from_now();
+    window.forget_past();
     window.click_at(x, y, 1);
     let picked = window.wait("picked", |event| event["cloud"] == 0);
     let values = window.wait("values", |event| !event["values"].is_null());
@@ -140,7 +144,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     photograph("picked.png");
 
     // A double click sets the pivot: the camera looks at that very point.
-    window.from_now();
+    window.forget_past();
     window.click_at(x, y, 2);
     let pivoted =
         window.wait("settled", |event| distance(target(event), place(&picked["world"])) < 1e-9);
@@ -160,7 +164,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     window.keys(&["m"]);
     window.click_at(x - 60, y + 40, 1);
     window.wait("picked", |event| event["cloud"] == 0);
-    window.from_now();
+    window.forget_past();
     window.click_at(x + 70, y + 20, 1);
     let measured = window.wait("measured", |_| true);
     assert!(measured["distance"].as_f64() > Some(0.0), "{measured}");
@@ -168,10 +172,8 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     window.keys(&["m"]);
 
     // Another splat and another colour, by the panel.
-    window.press("ComboBox", "circle");
-    window.press("Button", "square");
-    window.press("ComboBox", "rgb");
-    window.press("Button", "elevation");
+    window.choose("circle", "square");
+    window.choose("rgb", "elevation");
     window.keys(&["f"]);
     window.settled();
     let picture = window.picture();
@@ -183,9 +185,8 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     // Clip: fewer points, and all of them inside.
     let before = window.last_settled();
     window.keys(&["c"]);
-    window.press("Button", "Around the point");
-    let clipped =
-        window.wait("settled", |event| event["points"].as_u64() < before["points"].as_u64());
+    let is_less = |event: &Value| event["points"].as_u64() < before["points"].as_u64();
+    let clipped = window.press_until("Around the point", "settled", is_less);
     assert!(clipped["points"].as_u64() > Some(0), "{clipped}");
     photograph("clipped.png");
     window.keys(&["c"]);
@@ -202,6 +203,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     // A second cloud, typed into the dialog.
     world.add("sim:courtyard?points=20k&seed=5", "second");
     window.keys(&["ctrl+o"]);
+    window.see("Label", "A file, a folder, a URL, or a server and a dataset");
     window.text(&world.file("second.lods"));
     window.keys(&["Return"]);
     let opened = window.wait("opened", |event| event["cloud"] == 1);
@@ -214,7 +216,7 @@ fn a_person_explores_a_served_dataset_and_finds_everything_again() {
     window.keys(&["n", "n"]);
     window.wait("cloud", |event| event["cloud"] == 0 && event["trouble"].is_string());
     photograph("trouble.png");
-    window.from_now();
+    window.forget_past();
     world.restart_server();
     window.wait("cloud", |event| event["cloud"] == 0 && event["trouble"].is_null());
     window.settled();

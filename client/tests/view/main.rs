@@ -8,6 +8,7 @@ mod world;
 
 mod bad_cases;
 mod explore;
+mod paths;
 
 /// Whether nothing can show a window here: then only that is tried.
 fn is_without_gpu() -> bool {

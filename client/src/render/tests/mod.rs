@@ -4,6 +4,7 @@ mod extremes;
 mod fallbacks;
 mod modes;
 mod pictures;
+mod seen;
 
 use std::{
     path::PathBuf,

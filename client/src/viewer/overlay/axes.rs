@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Stroke, vec2};
 use glam::DVec3;
 
 use super::MARGIN;
-use crate::viewer::{theme::Palette, viewer::Viewer};
+use crate::viewer::{state::Viewer, theme::Palette};
 
 const LENGTH: f32 = 30.0;
 

@@ -7,8 +7,8 @@ use super::Projector;
 use crate::viewer::{
     measurement::Measurement,
     numbers,
+    state::{Tool, Viewer},
     theme::Palette,
-    viewer::{Tool, Viewer},
 };
 
 pub fn draw(viewer: &Viewer, painter: &Painter, projector: &Projector, palette: Palette) {

@@ -1,8 +1,8 @@
-//! What is told, at the top of the picture.
+//! What is told, at the foot of the picture.
 
 use egui::{Align2, Frame, Margin, RichText, Stroke, Ui, vec2};
 
-use crate::viewer::{messages::Weight, theme::Palette, viewer::Viewer};
+use crate::viewer::{messages::Weight, state::Viewer, theme::Palette};
 
 /// Widest line.
 const WIDEST: f32 = 560.0;
@@ -18,10 +18,10 @@ pub fn show(viewer: &mut Viewer, ui: &Ui, palette: Palette) {
         return;
     }
     let mut dismissed = None;
-    let at = rect.center_top() + vec2(0.0, 14.0);
+    let at = rect.center_bottom() - vec2(0.0, 14.0);
     egui::Area::new(egui::Id::unique("messages"))
         .order(egui::Order::Middle)
-        .pivot(Align2::CENTER_TOP)
+        .pivot(Align2::CENTER_BOTTOM)
         .fixed_pos(at)
         .show(ui.ctx(), |ui| {
             ui.set_max_width(WIDEST.min(rect.width() - 120.0).max(120.0));

@@ -11,7 +11,7 @@ mod scale_bar;
 
 use egui::{Color32, FontId, Painter, Pos2, Ui};
 
-use super::{theme::Palette, viewer::Viewer};
+use super::{state::Viewer, theme::Palette};
 use projector::Projector;
 
 /// Between what is drawn and the edges of the picture.

@@ -3,7 +3,7 @@
 use egui::{Align2, Color32, FontId, Painter, Shape, Stroke, Vec2, vec2};
 
 use super::MARGIN;
-use crate::viewer::{theme::Palette, viewer::Viewer};
+use crate::viewer::{state::Viewer, theme::Palette};
 
 const RADIUS: f32 = 24.0;
 

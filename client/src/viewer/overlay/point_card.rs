@@ -3,7 +3,7 @@
 use egui::{Frame, Margin, RichText, ScrollArea, Stroke, Ui, vec2};
 
 use super::MARGIN;
-use crate::viewer::{numbers, panel::row, theme::Palette, viewer::Viewer};
+use crate::viewer::{numbers, panel::row, state::Viewer, theme::Palette};
 
 const WIDTH: f32 = 250.0;
 

@@ -3,7 +3,7 @@
 use egui::{Align2, FontId, Painter, Pos2, Stroke, vec2};
 
 use super::MARGIN;
-use crate::viewer::{numbers, theme::Palette, viewer::Viewer};
+use crate::viewer::{numbers, state::Viewer, theme::Palette};
 
 /// Longest bar, logical pixels.
 const LONGEST: f32 = 150.0;

@@ -5,7 +5,7 @@ use egui::{ComboBox, DragValue, Slider, Ui};
 use super::field;
 use crate::{
     render::{ColorMode, EyeDome, LARGEST_SPLAT_PX, SMALLEST_SPLAT_PX, Splat, SplatSize},
-    viewer::{theme::Palette, viewer::Viewer},
+    viewer::{state::Viewer, theme::Palette},
 };
 
 /// Kinds of sizes.

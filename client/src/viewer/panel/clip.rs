@@ -5,7 +5,7 @@ use egui::{RangeSlider, Ui};
 use super::field;
 use crate::{
     engine::ClipBox,
-    viewer::{theme::Palette, viewer::Viewer},
+    viewer::{state::Viewer, theme::Palette},
 };
 
 pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
@@ -23,10 +23,11 @@ pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
         let mut to = clip.max[axis] - low[axis];
         let range = from.min(0.0)..=to.max(extent);
         let decimals = (3.0 - extent.log10().floor()).clamp(0.0, 9.0) as usize;
-        let response = field(ui, palette, &format!("{name} from {:.0}", low[axis]), |ui| {
-            ui.spacing_mut().slider_width = 90.0;
-            ui.add(RangeSlider::new(&mut from, &mut to, range).max_decimals(decimals))
-        });
+        let response =
+            field(ui, palette, &format!("{name} from {}", low[axis].round() as i64), |ui| {
+                ui.spacing_mut().slider_width = 72.0;
+                ui.add(RangeSlider::new(&mut from, &mut to, range).max_decimals(decimals))
+            });
         if response.changed() {
             (clip.min[axis], clip.max[axis]) = (low[axis] + from, low[axis] + to.max(from));
         }

@@ -7,8 +7,8 @@ use egui::{Align, Button, ComboBox, Layout, RichText, ScrollArea, Ui};
 use crate::{
     render::ColorMode,
     viewer::{
-        actions::Action, clouds::Cloud, numbers, point_values::class_name, theme::Palette,
-        viewer::Viewer,
+        actions::Action, clouds::Cloud, numbers, point_values::class_name, state::Viewer,
+        theme::Palette,
     },
 };
 
@@ -156,5 +156,5 @@ fn class_range(manifest: &lodestream_protocol::Manifest) -> Option<std::ops::Ran
     let attribute = manifest.attribute("classification")?;
     let (low, high) = (*attribute.min.first()?, *attribute.max.first()?);
     // Casts saturate: beyond 255 there are no classes.
-    (low <= high).then(|| low as u8..=high as u8)
+    (low <= high).then_some(low as u8..=high as u8)
 }

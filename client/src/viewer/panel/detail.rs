@@ -3,7 +3,7 @@
 use egui::{Slider, Ui};
 
 use super::field;
-use crate::viewer::{Settings, numbers, theme::Palette, viewer::Viewer};
+use crate::viewer::{Settings, numbers, state::Viewer, theme::Palette};
 
 /// Most points of the slider; the command line may ask for more.
 const MOST_POINTS: u64 = 20_000_000;
@@ -16,7 +16,7 @@ pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
         let slider = Slider::new(&mut settings.point_budget, *Settings::BUDGETS.start()..=most)
             .logarithmic(true)
             .custom_formatter(|points, _| numbers::short(points as u64))
-            .custom_parser(|text| points(text));
+            .custom_parser(points);
         ui.add(slider).on_hover_text("Most points drawn at once, over all clouds")
     });
     field(ui, palette, "Least node", |ui| {

@@ -5,7 +5,7 @@ use egui::{RichText, Ui};
 use super::row;
 use crate::{
     engine::Tally,
-    viewer::{numbers, theme::Palette, viewer::Viewer},
+    viewer::{numbers, state::Viewer, theme::Palette},
 };
 
 pub fn show(viewer: &Viewer, ui: &mut Ui) {

@@ -16,8 +16,8 @@ use super::{
     navigation::{Mode, Side},
     numbers,
     settings::Theme,
+    state::{Tool, Viewer},
     theme::Palette,
-    viewer::{Tool, Viewer},
 };
 
 /// Width of the panel.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use egui::{TextEdit, Ui};
 
-use crate::viewer::viewer::Viewer;
+use crate::viewer::state::Viewer;
 
 pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
     ui.add(TextEdit::singleline(&mut viewer.fields.session).desired_width(f32::INFINITY));

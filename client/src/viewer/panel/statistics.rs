@@ -3,7 +3,7 @@
 use egui::Ui;
 
 use super::row;
-use crate::viewer::{numbers, theme::Palette, viewer::Viewer};
+use crate::viewer::{numbers, state::Viewer, theme::Palette};
 
 pub fn show(viewer: &Viewer, ui: &mut Ui) {
     let palette = Palette::of(viewer.settings.theme);

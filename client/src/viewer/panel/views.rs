@@ -2,7 +2,7 @@
 
 use egui::{Button, DragValue, RichText, TextEdit, Ui};
 
-use crate::viewer::{actions::Action, export::MOST_FRAMES, theme::Palette, viewer::Viewer};
+use crate::viewer::{actions::Action, export::MOST_FRAMES, state::Viewer, theme::Palette};
 
 pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let palette = Palette::of(viewer.settings.theme);
