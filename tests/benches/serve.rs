@@ -41,7 +41,8 @@ const FILE_BYTES: u64 = 64 << 20;
 const SIZES: [u64; 5] = [4 << 10, 16 << 10, 64 << 10, 256 << 10, 1 << 20];
 const CONNECTIONS: [u32; 2] = [16, 256];
 const NODE_BYTES: u32 = 16 << 10;
-const NODES: usize = 64;
+/// As many bytes as the client asks for at once.
+const NODES: usize = 16;
 /// Of every measurement.
 const SECONDS: u32 = 3;
 /// Different requests that a thread of wrk repeats.
@@ -383,7 +384,7 @@ async fn exchange(stream: &TcpStream, request: &[u8]) -> io::Result<()> {
                 return Err(io::ErrorKind::UnexpectedEof.into());
             }
             // A head comes in one piece, with whatever there is of the body.
-            Ok(match left {
+            Ok::<_, io::Error>(match left {
                 None => answer_bytes(&taken[..count])?.checked_sub(count),
                 Some(left) => usize::checked_sub(left, count),
             })
