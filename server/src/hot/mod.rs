@@ -28,9 +28,7 @@ use self::{
     answer::Answer,
     head::{Head, Wanted},
 };
-use crate::{
-    connection::ConnectionLimits, metrics::Answered, routes::Site, storage::dataset_name,
-};
+use crate::{connection::ConnectionLimits, metrics::Answered, routes::Site, storage::dataset_name};
 
 /// What a client may send that is no whole head before the long way takes over.
 const MAX_HEAD_BYTES: usize = 4 << 10;
