@@ -277,7 +277,8 @@ async fn caches_in_between_keep_nothing_for_others() {
         let response = site.get(target, fields).await;
         let kept = field(response.headers(), "cache-control").to_owned();
         assert!(kept.contains("private") && !kept.contains("public"), "{target}: {kept}");
-        assert!(field(response.headers(), "vary").contains("authorization"), "{target}");
+        let mut varies = response.headers().get_all("vary").iter();
+        assert!(varies.any(|field| field == "authorization"), "{target}");
     }
     let response = site.get("/open.lods", &[]).await;
     assert!(field(response.headers(), "cache-control").contains("public"), "everyone's");
