@@ -432,7 +432,7 @@ fn walk(url: &str, batches: bool) -> Result<Walk> {
     let (min, max) = (DVec3::from(bounds.0), DVec3::from(bounds.1));
     let overview = Camera::overview(min, max, 1.5);
     for share in [1.0, 0.2, 0.1, 0.05] {
-        let mut camera = overview.clone();
+        let mut camera = overview;
         camera.eye = camera.target + (camera.eye - camera.target) * share;
         engine.set_view(View { camera, size_px: [1280, 720] });
         engine.wait_settled(patience)?;
