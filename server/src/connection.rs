@@ -1,12 +1,6 @@
 //! One client's connection.
 
-use std::{
-    io::{self, Cursor},
-    net::SocketAddr,
-    pin::Pin,
-    sync::Arc,
-    time::Duration,
-};
+use std::{io::Cursor, net::SocketAddr, pin::Pin, sync::Arc, time::Duration};
 
 use axum::Router;
 use hyper::server::conn::{http1, http2};
@@ -86,29 +80,26 @@ async fn converse(
     }
     let limits = host.limits;
     let peer = Peer { ip: address.ip(), is_encrypted: host.tls.is_some() };
-    let Some(tls) = &host.tls else {
-        let is_http2 = timeout(limits.head_timeout, begins_with_preface(&stream)).await??;
-        if is_http2 {
-            return speak(limited(stream, limits), true, peer, host, watcher).await;
-        }
-        let begun = hot::serve(&stream, &host.site, limits, stopping).await;
-        let Some(begun) = begun else { return Ok(()) };
-        let (reader, writer) = stream.into_split();
-        // What was read of a request already comes first.
-        let stream = tokio::io::join(Cursor::new(begun).chain(reader), writer);
-        return speak(limited(stream, limits), false, peer, host, watcher).await;
-    };
-    let handshake = tls.acceptor().accept(limited(stream, limits));
-    let stream = match timeout(limits.head_timeout, handshake).await {
-        Ok(Ok(stream)) => stream,
-        failed => {
-            host.site.metrics.handshakes_failed.inc();
-            failed??;
-            return Ok(());
-        }
-    };
-    let is_http2 = stream.get_ref().1.alpn_protocol() == Some(b"h2");
-    speak(stream, is_http2, peer, host, watcher).await
+    if let Some(tls) = &host.tls {
+        let handshake = tls.acceptor().accept(limited(stream, limits));
+        let stream = match timeout(limits.head_timeout, handshake).await {
+            Ok(Ok(stream)) => stream,
+            failed => {
+                host.site.metrics.handshakes_failed.inc();
+                failed??;
+                return Ok(());
+            }
+        };
+        let is_http2 = stream.get_ref().1.alpn_protocol() == Some(b"h2");
+        return speak(stream, is_http2, peer, host, watcher).await;
+    }
+    let begun = hot::serve(&stream, &host.site, limits, stopping).await;
+    let Some(begun) = begun else { return Ok(()) };
+    let is_http2 = PREFACE.starts_with(&begun) || begun.starts_with(PREFACE);
+    let (reader, writer) = stream.into_split();
+    // What was read of a request already comes first.
+    let stream = tokio::io::join(Cursor::new(begun).chain(reader), writer);
+    speak(limited(stream, limits), is_http2, peer, host, watcher).await
 }
 
 fn limited<S>(stream: S, limits: ConnectionLimits) -> Pin<Box<TimeoutStream<S>>>
@@ -118,22 +109,6 @@ where
     let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(limits.write_timeout));
     Box::pin(stream)
-}
-
-/// Whether a client opens with HTTP/2's first words. Nothing is taken from the stream.
-async fn begins_with_preface(stream: &TcpStream) -> io::Result<bool> {
-    let mut first = [0; PREFACE.len()];
-    loop {
-        let seen = stream.peek(&mut first).await?;
-        if seen == 0 || !PREFACE.starts_with(&first[..seen]) {
-            return Ok(false);
-        }
-        if seen == first.len() {
-            return Ok(true);
-        }
-        // The rest is on its way; the system tells of no more bytes while these are not taken.
-        tokio::time::sleep(Duration::from_millis(1)).await;
-    }
 }
 
 async fn speak<S>(

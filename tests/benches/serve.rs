@@ -41,7 +41,8 @@ const FILE_BYTES: u64 = 64 << 20;
 const SIZES: [u64; 5] = [4 << 10, 16 << 10, 64 << 10, 256 << 10, 1 << 20];
 const CONNECTIONS: [u32; 2] = [16, 256];
 const NODE_BYTES: u32 = 16 << 10;
-const NODES: usize = 64;
+/// As many bytes as the client asks for at once.
+const NODES: usize = 16;
 /// Of every measurement.
 const SECONDS: u32 = 3;
 /// Different requests that a thread of wrk repeats.
@@ -383,7 +384,7 @@ async fn exchange(stream: &TcpStream, request: &[u8]) -> io::Result<()> {
                 return Err(io::ErrorKind::UnexpectedEof.into());
             }
             // A head comes in one piece, with whatever there is of the body.
-            Ok(match left {
+            Ok::<_, io::Error>(match left {
                 None => answer_bytes(&taken[..count])?.checked_sub(count),
                 Some(left) => usize::checked_sub(left, count),
             })
@@ -431,7 +432,7 @@ fn walk(url: &str, batches: bool) -> Result<Walk> {
     let (min, max) = (DVec3::from(bounds.0), DVec3::from(bounds.1));
     let overview = Camera::overview(min, max, 1.5);
     for share in [1.0, 0.2, 0.1, 0.05] {
-        let mut camera = overview.clone();
+        let mut camera = overview;
         camera.eye = camera.target + (camera.eye - camera.target) * share;
         engine.set_view(View { camera, size_px: [1280, 720] });
         engine.wait_settled(patience)?;

@@ -87,6 +87,8 @@ fn render(index: &DatasetIndex, origin: &str, now: SystemTime, rights: &Rights) 
 }
 
 fn card(dataset: &DatasetEntry, origin: &str, now: SystemTime) -> Markup {
+    // Where an address is too long for its line, it is best broken before the name.
+    let (folder, file) = dataset.url.split_at(dataset.url.find('/').map_or(0, |slash| slash + 1));
     html! {
         article {
             div.sky {
@@ -109,12 +111,13 @@ fn card(dataset: &DatasetEntry, origin: &str, now: SystemTime) -> Markup {
                         dt { "Changed" } dd { time datetime=(modified) title=(modified) { (age(modified, now)) } }
                     }
                 }
-                @if !dataset.attributes.is_empty() {
-                    ul aria-label="Attributes" {
-                        @for attribute in &dataset.attributes { li { (attribute.name) } }
+                ul aria-label="Attributes" {
+                    // What is the same everywhere tells nobody anything.
+                    @for attribute in dataset.attributes.iter().filter(|a| !a.constant) {
+                        li { (attribute.name) }
                     }
                 }
-                code.address { (origin) "/" (dataset.url) }
+                code.address { (origin) "/" (folder) wbr; (file) }
             }
         }
     }

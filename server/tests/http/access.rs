@@ -57,8 +57,12 @@ fn rules() -> AccessRules {
     }
 }
 
-/// A folder with what everyone may read and what not, and a file beside it.
 fn site() -> Site {
+    site_with(Access::Rules(rules()))
+}
+
+/// A folder with what everyone may read and what not, and a file beside it.
+fn site_with(access: Access) -> Site {
     let site = Site::configured(|config| {
         // One level down, so that something can lie beside it.
         let dir = match &config.data {
@@ -67,7 +71,7 @@ fn site() -> Site {
         };
         fs::create_dir_all(dir.join("below")).expect("writable");
         config.data = lodestream_server::DataPlace::Folder(dir);
-        config.access = Access::Rules(rules());
+        config.access = access;
     });
     for (seed, name) in (1..).zip([
         "served/open.lods",
@@ -143,13 +147,25 @@ fn send(site: &Site, request: &str) -> Vec<u8> {
 
 #[test]
 fn every_attempt_of_the_table_is_refused() {
+    let failures = failures(&site());
+    assert!(failures.is_empty(), "{} attempts:\n{}", failures.len(), failures.join("\n---\n"));
+}
+
+#[test]
+fn the_table_notices_a_server_without_rules() {
+    let failures = failures(&site_with(Access::Open));
+    assert!(failures.len() > 40, "only {} attempts are noticed", failures.len());
+}
+
+/// What of the table is not refused as it should be.
+fn failures(site: &Site) -> Vec<String> {
     let attempts: Vec<Attempt> =
         serde_json::from_str(include_str!("../access.json")).expect("the table is sound");
     assert!(attempts.len() >= 40);
-    let (site, expires) = (site(), seconds(3600));
+    let expires = seconds(3600);
     let mut failures = Vec::new();
     for attempt in &attempts {
-        let fill = |text: &str| filled(text, &site, expires);
+        let fill = |text: &str| filled(text, site, expires);
         let method = attempt.method.as_deref().unwrap_or("GET");
         let mut request = format!("{method} {} HTTP/1.1\r\n", fill(&attempt.target));
         if !attempt.fields.contains_key("host") {
@@ -158,7 +174,7 @@ fn every_attempt_of_the_table_is_refused() {
         for (name, value) in &attempt.fields {
             request += &format!("{name}: {}\r\n", fill(value));
         }
-        let response = send(&site, &(request + "connection: close\r\n\r\n"));
+        let response = send(site, &(request + "connection: close\r\n\r\n"));
         let text = String::from_utf8_lossy(&response);
         let status: u16 = text.get(9..12).and_then(|s| s.parse().ok()).unwrap_or(0);
         let is_right = match attempt.status {
@@ -181,7 +197,7 @@ fn every_attempt_of_the_table_is_refused() {
             ));
         }
     }
-    assert!(failures.is_empty(), "{} attempts:\n{}", failures.len(), failures.join("\n---\n"));
+    failures
 }
 
 #[tokio::test]
@@ -261,8 +277,8 @@ async fn caches_in_between_keep_nothing_for_others() {
         let response = site.get(target, fields).await;
         let kept = field(response.headers(), "cache-control").to_owned();
         assert!(kept.contains("private") && !kept.contains("public"), "{target}: {kept}");
-        let vary = response.headers().get_all("vary");
-        assert!(vary.iter().any(|value| value == "authorization"), "{target}");
+        let mut varies = response.headers().get_all("vary").iter();
+        assert!(varies.any(|field| field == "authorization"), "{target}");
     }
     let response = site.get("/open.lods", &[]).await;
     assert!(field(response.headers(), "cache-control").contains("public"), "everyone's");
@@ -286,4 +302,31 @@ fn an_address_that_others_reach_needs_rules_or_a_word() {
     let refused = lodestream_server::spawn(config.clone());
     assert!(matches!(refused, Err(lodestream_server::Error::Exposed { .. })), "{refused:?}");
     // What is allowed is not tried: tests listen on this machine alone.
+}
+
+#[test]
+fn a_connection_that_stands_when_rules_come_is_held_to_them() {
+    let site = site_with(Access::Open);
+    let mut stream = TcpStream::connect(site.server.addr()).expect("the server accepts");
+    stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a valid time");
+    // Nothing but what the short way takes.
+    let mut status = |name: &str| {
+        let request = format!("GET /{name}.lods HTTP/1.1\r\nhost: x\r\nrange: bytes=0-3\r\n\r\n");
+        stream.write_all(request.as_bytes()).expect("the server reads");
+        let mut response = Vec::new();
+        let mut byte = [0];
+        while !response.ends_with(b"\r\n\r\n") {
+            stream.read_exact(&mut byte).expect("the server answers");
+            response.push(byte[0]);
+        }
+        let head = String::from_utf8(response).expect("text").to_lowercase();
+        let length = head.split("content-length: ").nth(1).and_then(|rest| rest.lines().next());
+        let mut body = vec![0; length.and_then(|l| l.parse().ok()).expect("a length")];
+        stream.read_exact(&mut body).expect("the server answers");
+        (head[9..12].to_owned(), body == b"LODS")
+    };
+    assert_eq!(status("secret"), ("206".to_owned(), true));
+    site.server.control().set_access(Access::Rules(rules())).expect("loopback");
+    assert_eq!(status("secret"), ("404".to_owned(), false));
+    assert_eq!(status("open"), ("206".to_owned(), true));
 }

@@ -97,5 +97,5 @@ async fn the_page_needs_no_scripts_and_lets_none_in() {
     assert!(policy.starts_with("default-src 'none'") && !policy.contains("script-src"));
     let page = response.text().await.expect("a page");
     assert!(!page.contains("<script"));
-    assert!(page.contains("http://data.example/datasets/a.lods"), "{page}");
+    assert!(page.contains("http://data.example/datasets/<wbr>a.lods"), "{page}");
 }

@@ -45,7 +45,7 @@ async fn datasets_come_encrypted_by_http_2_and_by_http_1() {
         assert_eq!((response.status().as_u16(), response.version()), (200, version));
         assert!(response.bytes().await.expect("a body") == bytes);
     }
-    let page = format!("https://localhost:{}/datasets/a.lods", site.server.addr().port());
+    let page = format!("https://localhost:{}/datasets/<wbr>a.lods", site.server.addr().port());
     let client = client(&site, write_certificate(&files)).build().expect("a client");
     assert!(client.get(url(&site, "/")).send().await.is_err(), "the new one is not in use yet");
     site.server.control().reload_tls().expect("a sound certificate");

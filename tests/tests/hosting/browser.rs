@@ -14,7 +14,6 @@ pub struct Look {
     pub width: u32,
     pub height: u32,
     pub is_dark: bool,
-    pub has_scripts: bool,
 }
 
 /// The page's picture.
@@ -52,9 +51,6 @@ fn run(look: Look, arguments: &[&str]) -> String {
         command.arg("--blink-settings=preferredColorScheme=0");
     } else {
         command.arg("--blink-settings=preferredColorScheme=1");
-    }
-    if !look.has_scripts {
-        command.arg("--blink-settings=scriptEnabled=false");
     }
     let child = command.args(arguments).spawn();
     let child = child.unwrap_or_else(|e| panic!("./dev test installs chromium: {e}"));

@@ -40,7 +40,10 @@ fn the_shipped_configuration_has_every_setting_with_its_default() {
     let mut full = String::new();
     for line in text.lines() {
         let bare = line.strip_prefix("# ").unwrap_or(line);
-        let is_setting = bare.starts_with('[') || bare.contains(" = ");
+        let is_word =
+            |name: &str| name.chars().all(|c| c.is_ascii_lowercase() || "_0123456789".contains(c));
+        let is_setting =
+            bare.starts_with('[') || bare.split_once(" = ").is_some_and(|(name, _)| is_word(name));
         full += &format!("{}\n", if is_setting { bare } else { "" });
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
