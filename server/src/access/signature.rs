@@ -97,7 +97,7 @@ pub(super) fn verify(query: &str, keys: &[Secret], now: SystemTime) -> Result<Op
 /// The fields of a signed address, without what else the query holds.
 pub(super) fn only_link(query: &str) -> String {
     let name =
-        |pair: &&str| pair.split_once('=').map_or(false, |(name, _)| LINK_FIELDS.contains(&name));
+        |pair: &&str| pair.split_once('=').is_some_and(|(name, _)| LINK_FIELDS.contains(&name));
     query.split('&').filter(name).collect::<Vec<_>>().join("&")
 }
 

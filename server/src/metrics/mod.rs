@@ -213,7 +213,7 @@ impl Metrics {
             m.denied.clone(),
         );
         m.storage.register(&mut registry);
-        registry.register_collector(Box::new(Process::default()));
+        registry.register_collector(Box::new(Process));
         Self { registry, ..metrics }
     }
 
