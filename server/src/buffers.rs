@@ -9,8 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// 64 KiB and of 512 KiB take a sixth and a half more time per byte.
 pub(crate) const PIECE_BYTES: usize = 256 << 10;
 
-/// Free buffers kept: 16 MiB.
-const MAX_FREE: usize = 64;
+/// Free buffers kept: 64 MiB, where as much was needed at once. Beyond that, each piece costs fresh memory,
+/// which has to be blanked first.
+const MAX_FREE: usize = 256;
 
 /// Hands out buffers and takes them back.
 #[derive(Debug, Default)]

@@ -162,26 +162,19 @@ impl PrivateCopy {
     /// Whether the ends of the range are in the system's cache. A thread that sends what is not waits
     /// for the disk; where both ends are there, what lies between nearly always is.
     pub(crate) fn is_cached(&self, range: &Range<u64>) -> bool {
-        self.is_begun(range.start) && self.is_begun(range.end - 1)
-    }
-
-    /// Whether the byte at the offset is in the system's cache.
-    pub(crate) fn is_begun(&self, offset: u64) -> bool {
         use rustix::io::{ReadWriteFlags, preadv2};
-        let byte = &mut [0];
-        let byte = &mut [io::IoSliceMut::new(byte)];
-        preadv2(&self.file, byte, offset, ReadWriteFlags::NOWAIT) == Ok(1)
+        let is_there = |offset| {
+            let byte = &mut [0];
+            let byte = &mut [io::IoSliceMut::new(byte)];
+            preadv2(&self.file, byte, offset, ReadWriteFlags::NOWAIT) == Ok(1)
+        };
+        is_there(range.start) && is_there(range.end - 1)
     }
 
-    /// Sends bytes that wait for what follows.
-    pub(crate) fn send_more(&self, stream: &TcpStream, bytes: &[u8]) -> io::Result<usize> {
+    /// Sends a response's head, which waits for what follows so that they share a packet.
+    pub(crate) fn send_head(&self, stream: &TcpStream, head: &[u8]) -> io::Result<usize> {
         use rustix::net::{SendFlags, send};
-        Ok(send(stream, bytes, SendFlags::MORE | SendFlags::NOSIGNAL)?)
-    }
-
-    /// Has the system send full packets only, until told otherwise.
-    pub(crate) fn hold_back(&self, stream: &TcpStream, is_held: bool) -> io::Result<()> {
-        Ok(rustix::net::sockopt::set_tcp_cork(stream, is_held)?)
+        Ok(send(stream, head, SendFlags::MORE | SendFlags::NOSIGNAL)?)
     }
 
     /// Sends some of the range.
@@ -199,15 +192,7 @@ impl PrivateCopy {
         false
     }
 
-    pub(crate) fn is_begun(&self, _: u64) -> bool {
-        false
-    }
-
-    pub(crate) fn send_more(&self, _: &TcpStream, _: &[u8]) -> io::Result<usize> {
-        Err(io::ErrorKind::Unsupported.into())
-    }
-
-    pub(crate) fn hold_back(&self, _: &TcpStream, _: bool) -> io::Result<()> {
+    pub(crate) fn send_head(&self, _: &TcpStream, _: &[u8]) -> io::Result<usize> {
         Err(io::ErrorKind::Unsupported.into())
     }
 

