@@ -46,6 +46,7 @@ pub(crate) async fn observe(
 ) -> Response {
     let start = Instant::now();
     let kind = Kind::of(route.as_ref().map(MatchedPath::as_str));
+    let is_head = request.method() == Method::HEAD;
     let entry = site.access_log.then(|| Entry::of(&site, &request));
     let mut response = next.run(request).await;
     let extensions = response.extensions_mut();
@@ -61,7 +62,8 @@ pub(crate) async fn observe(
         bytes: 0,
         start,
         until_first_byte: start.elapsed(),
-        is_whole: false,
+        // A body of nothing is never looked at, nor is what `HEAD` leaves out.
+        is_whole: is_head || response.body().is_end_stream(),
     };
     response.map(|body| Body::new(ObservedBody { inner: body, record }))
 }

@@ -43,6 +43,19 @@ async fn figures_tell_what_was_served() {
 }
 
 #[tokio::test]
+async fn a_response_without_a_body_is_not_counted_as_broken() {
+    let (site, _) = Site::with_dataset();
+    let tag =
+        field(site.get("/a.lods", &[("range", "bytes=0-0")]).await.headers(), "etag").to_owned();
+    assert_eq!(site.send(Method::HEAD, "/a.lods", &[]).await.status(), 200);
+    assert_eq!(site.get("/a.lods", &[("if-none-match", &tag)]).await.status(), 304);
+    let name = "lodestream_requests_total{dataset=\"a\",kind=\"file\",status=\"304\"}";
+    assert!((figure(&site, name).await - 1.0).abs() < 0.1);
+    let text = site.get("/metrics", &[]).await.text().await.expect("figures");
+    assert!(!text.contains("\nlodestream_responses_broken_total{"), "{text}");
+}
+
+#[tokio::test]
 async fn a_response_that_the_client_left_is_counted_as_broken() {
     let site = Site::new();
     site.put("big.lods", &dataset(1, 64 << 20));
