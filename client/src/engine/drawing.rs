@@ -86,7 +86,7 @@ mod tests {
         };
         let id = NodeId { cloud: 0, key: node.key };
         let node = Arc::new(node);
-        Pick { id, node, refinement, parent, family, priority: 1.0, reserved: 1 }
+        Pick { id, node, refinement, parent, family, priority: 1.0, urgency: 1.0, reserved: 1 }
     }
 
     /// Two levels below a root: 0 → 1, 2; 1 → 3, 4.

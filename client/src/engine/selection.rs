@@ -53,6 +53,8 @@ pub(super) struct Pick {
     pub family: Option<Range<usize>>,
     /// At most that of the node above.
     pub priority: f64,
+    /// How early it is loaded; at most that of the node above.
+    pub urgency: f64,
     /// Points that this node or what stands in for it may come to.
     pub reserved: u64,
 }
@@ -247,10 +249,16 @@ impl Walk<'_> {
         parent: Option<usize>,
         priority: f64,
     ) -> usize {
-        let refinement = match &self.trees[cloud] {
-            Some(tree) => tree.boot().manifest.refinement,
-            None => Refinement::Additive,
+        let (refinement, urgency) = match &self.trees[cloud] {
+            Some(tree) => {
+                let manifest = &tree.boot().manifest;
+                let bounds = WorldBox::of(&node.bounds, &manifest.lattice);
+                let urgency = self.limits.priority.urgency(self.optics, &bounds, priority);
+                (manifest.refinement, urgency)
+            }
+            None => (Refinement::Additive, priority),
         };
+        let above = parent.map_or(f64::INFINITY, |parent| self.out.picks[parent].urgency);
         self.out.picks.push(Pick {
             id: NodeId { cloud, key: node.key },
             node: Arc::clone(node),
@@ -258,6 +266,7 @@ impl Walk<'_> {
             parent,
             family: None,
             priority,
+            urgency: urgency.min(above),
             reserved: u64::from(node.points),
         });
         self.out.picks.len() - 1

@@ -348,7 +348,13 @@ impl Traversal {
         }
         let mut pieces = self.missing_pages();
         plan.pages_loading = pieces.len() as u64;
-        for &i in &drawing.needed {
+        let mut in_turn = drawing.needed;
+        // Nodes above others are at least as urgent, and come before them among equals.
+        in_turn.sort_by(|&a, &b| {
+            let urgency = |i: usize| self.selection.picks[i].urgency;
+            urgency(b).total_cmp(&urgency(a))
+        });
+        for i in in_turn {
             let pick = &self.selection.picks[i];
             let before = pieces.len();
             self.missing_groups(pick, &mut pieces);

@@ -38,7 +38,7 @@ fn large_nodes_and_those_in_the_middle_arrive_first() {
     let (_folder, path) = write(&dataset(recipe));
     let link = "20mbit/40ms".parse().expect("a link");
     // Ours weighs bytes, too, which are random here.
-    for (priority, least) in [(Priority::ErrorPerByte, 0.1), (Priority::Fraiss, 0.5)] {
+    for (priority, least) in [(Priority::ErrorPerByte, 0.3), (Priority::Fraiss, 0.5)] {
         // A request for each, so that none rides along with its neighbours.
         let config = EngineConfig {
             point_budget: u64::MAX,
@@ -50,7 +50,6 @@ fn large_nodes_and_those_in_the_middle_arrive_first() {
         let arrivals = arrivals(&path, config, link, along(recipe.corner));
         assert!(arrivals.len() > 200, "{} nodes", arrivals.len());
         let (size, offset) = correlations(&arrivals);
-        println!("{priority:?}: size {size:.2}, offset {offset:.2}");
         assert!(size < -0.7, "{priority:?}: arrival and size {size}");
         assert!(offset > least, "{priority:?}: arrival and distance from the middle {offset}");
     }
