@@ -71,7 +71,6 @@ fn little_is_fetched_in_vain_when_the_view_jumps() {
         };
         let share = |totals: Totals| totals.wasted_bytes() as f64 / totals.bytes as f64;
         let (with, without) = (run(true), run(false));
-        println!("{link}: {:.3}, {:.3} without; {with:?}", share(with), share(without));
         assert!(with.cancelled > 5, "{link}: {with:?}");
         assert!(share(with) < 0.1, "{link}: {:.3} of {} bytes", share(with), with.bytes);
         assert!(share(with) < share(without), "{link}: {} {}", share(with), share(without));
