@@ -93,7 +93,7 @@ fn main() -> Result<()> {
         calls.push(seen.call_ms);
         on.push(seen.draw_ms);
         kept.look(&seen);
-        if calls.len() % 64 == 0 {
+        if calls.len().is_multiple_of(64) {
             peak = peak.max(process::resident_mib());
         }
     })?;
@@ -190,7 +190,7 @@ impl Kept {
 
     fn look(&mut self, seen: &Seen) {
         self.seen += 1;
-        if self.seen % self.every == 0 {
+        if self.seen.is_multiple_of(self.every) {
             let plan: &FramePlan = &seen.plan;
             let nodes = plan.nodes.iter().map(|node| (node.cloud, node.key, node.spacing));
             self.frames.push(Frame {

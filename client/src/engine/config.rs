@@ -1,4 +1,4 @@
-//! What the engine is told once.
+//! What the engine is told when it starts. Some of it may be changed later: see `settings.rs`.
 
 use lodestream_protocol::BOOT_SPECULATIVE_BYTES;
 

@@ -86,7 +86,9 @@ mod tests {
         };
         let id = NodeId { cloud: 0, key: node.key };
         let node = Arc::new(node);
-        Pick { id, node, refinement, parent, family, priority: 1.0, reserved: 1, is_exact: false }
+        let (priority, urgency, reserved) = (1.0, 1.0, 1);
+        let is_exact = false;
+        Pick { id, node, refinement, parent, family, priority, urgency, reserved, is_exact }
     }
 
     /// Two levels below a root: 0 → 1, 2; 1 → 3, 4.

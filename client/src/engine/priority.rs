@@ -12,6 +12,12 @@ const COST_BYTES: f64 = 10_000.0;
 /// Largest error in pixels that is told from others: it is that of what lies around the eye.
 const LARGEST_PX: f64 = 1e9;
 
+/// How much more urgent the middle is. Without, or with Fraiss's own 1, the nodes of the edge come before
+/// those of the same size in the middle (partial rank correlations of -0.2 on a courtyard of 1 M points from two
+/// places; 3: 0.05, 4: 0.1). The area between SSIM and 1 over time from a cold start, against none: near, 0.93 at
+/// 20 Mbit/s and 0.97 at 4; the whole cloud, 0.99 and 1.04.
+const MIDDLE: i32 = 4;
+
 /// Which nodes come first.
 ///
 /// Measured with everything else the same (960 x 540, a million points, 20 Mbit/s and 40 ms, from a
@@ -36,13 +42,12 @@ const LARGEST_PX: f64 = 1e9;
 ///
 /// Where the budget does not bind, the same nodes come in another order, and 1 % is all there is to gain;
 /// where it does, they are better ones. Without the weight of what is near, indoor views lose 5 %;
-/// Fraiss's weight of the middle changes nothing of that, and was added afterwards: people look there.
+/// Fraiss's weight of the middle changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Priority {
     /// Those that take away most error for their bytes: pixels of the picture that the node's
-    /// bounds take up, times how often the error there is halved, over the bytes to load; the more the
-    /// nearer, because what is near is less likely to lie behind something; and the more the nearer to the
-    /// middle (Fraiss 2017, eq. 3.4).
+    /// bounds take up, times how often the error there is halved, over the bytes to load; and the more
+    /// the nearer, because what is near is less likely to lie behind something.
     #[default]
     ErrorPerByte,
     /// The largest, and those in the middle of the picture. (Fraiss 2017, eqs. 3.2-3.4)
@@ -61,6 +66,18 @@ pub(super) struct Change {
 }
 
 impl Priority {
+    /// How early a node of that priority is loaded: people look at the middle, and boxes at the edge take up
+    /// more pixels. Which nodes are drawn in the end does not hang on it.
+    pub(super) fn urgency(self, optics: &Optics, bounds: &WorldBox, priority: f64) -> f64 {
+        match self {
+            Self::ErrorPerByte => {
+                let middle = optics.priority(bounds.center, 1.0); // Fraiss 2017, eq. 3.4
+                priority * middle.powi(MIDDLE)
+            }
+            Self::Fraiss => priority,
+        }
+    }
+
     /// What a node with these bounds is worth; not NaN, not negative.
     pub(super) fn of(self, optics: &Optics, bounds: &WorldBox, change: Change) -> f64 {
         match self {
@@ -69,7 +86,6 @@ impl Priority {
                 let seen = |error: f64| (error * scale).min(LARGEST_PX) + SEEN_PX;
                 let halvings = (seen(change.error_before) / seen(change.error_after)).log2();
                 let gain = optics.area(bounds) * halvings.max(0.0) * scale;
-                let gain = optics.priority(bounds.center, gain);
                 (gain / (change.bytes as f64 + COST_BYTES)).max(0.0)
             }
             Self::Fraiss => {

@@ -54,6 +54,8 @@ pub(super) struct Pick {
     pub family: Option<Range<usize>>,
     /// At most that of the node above.
     pub priority: f64,
+    /// How early it is loaded; at most that of the node above.
+    pub urgency: f64,
     /// Points that this node or what stands in for it may come to.
     pub reserved: u64,
     /// Whether its positions are to be exact.
@@ -250,13 +252,16 @@ impl Walk<'_> {
         parent: Option<usize>,
         priority: f64,
     ) -> usize {
-        let (refinement, is_exact) = match &self.trees[cloud] {
+        let (refinement, urgency, is_exact) = match &self.trees[cloud] {
             Some(tree) => {
                 let manifest = &tree.boot().manifest;
-                (manifest.refinement, self.shows_cells(manifest, node))
+                let bounds = WorldBox::of(&node.bounds, &manifest.lattice);
+                let urgency = self.limits.priority.urgency(self.optics, &bounds, priority);
+                (manifest.refinement, urgency, self.shows_cells(manifest, node, &bounds))
             }
-            None => (Refinement::Additive, false),
+            None => (Refinement::Additive, priority, false),
         };
+        let above = parent.map_or(f64::INFINITY, |parent| self.out.picks[parent].urgency);
         self.out.picks.push(Pick {
             id: NodeId { cloud, key: node.key },
             node: Arc::clone(node),
@@ -264,6 +269,7 @@ impl Walk<'_> {
             parent,
             family: None,
             priority,
+            urgency: urgency.min(above),
             reserved: u64::from(node.points),
             is_exact,
         });
@@ -271,14 +277,13 @@ impl Walk<'_> {
     }
 
     /// Whether the cells that a node's points lie in are large enough to be seen.
-    fn shows_cells(&self, manifest: &Manifest, node: &Node) -> bool {
+    fn shows_cells(&self, manifest: &Manifest, node: &Node, bounds: &WorldBox) -> bool {
         let cell_bits = manifest.cell_bits(node.key.level(), node.spacing);
         if cell_bits == 0 {
             return false;
         }
         let cell_world = f64::from(cell_bits).exp2() * manifest.lattice.scale;
-        let bounds = WorldBox::of(&node.bounds, &manifest.lattice);
-        let cell_px = cell_world * self.optics.largest_scale(&bounds);
+        let cell_px = cell_world * self.optics.largest_scale(bounds);
         // Where the numbers are no numbers, too.
         cell_px.partial_cmp(&self.limits.cell_px).is_none_or(Ordering::is_gt)
     }

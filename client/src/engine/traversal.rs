@@ -383,9 +383,15 @@ impl Traversal {
         }
         let mut pieces = self.missing_pages();
         plan.pages_loading = pieces.len() as u64;
+        let mut in_turn = drawing.needed.clone();
+        // Nodes above others are at least as urgent, and come before them among equals.
+        in_turn.sort_by(|&a, &b| {
+            let urgency = |i: usize| self.selection.picks[i].urgency;
+            urgency(b).total_cmp(&urgency(a))
+        });
         // Every node roughly before any of them exactly.
         let mut fine = Vec::new();
-        for &i in &drawing.needed {
+        for i in in_turn {
             let pick = &self.selection.picks[i];
             let before = pieces.len();
             self.missing_groups(pick, self.clouds[pick.id.cloud].groups, &mut pieces);

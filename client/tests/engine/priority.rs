@@ -38,7 +38,7 @@ fn large_nodes_and_those_in_the_middle_arrive_first() {
     let (_folder, path) = write(&dataset(recipe));
     let link = "20mbit/40ms".parse().expect("a link");
     // Ours weighs bytes, too, which are random here.
-    for (priority, least) in [(Priority::ErrorPerByte, 0.1), (Priority::Fraiss, 0.5)] {
+    for (priority, least) in [(Priority::ErrorPerByte, 0.3), (Priority::Fraiss, 0.5)] {
         // A request for each, so that none rides along with its neighbours.
         let config = EngineConfig {
             point_budget: u64::MAX,
@@ -50,7 +50,6 @@ fn large_nodes_and_those_in_the_middle_arrive_first() {
         let arrivals = arrivals(&path, config, link, along(recipe.corner));
         assert!(arrivals.len() > 200, "{} nodes", arrivals.len());
         let (size, offset) = correlations(&arrivals);
-        println!("{priority:?}: size {size:.2}, offset {offset:.2}");
         assert!(size < -0.7, "{priority:?}: arrival and size {size}");
         assert!(offset > least, "{priority:?}: arrival and distance from the middle {offset}");
     }
@@ -72,7 +71,6 @@ fn little_is_fetched_in_vain_when_the_view_jumps() {
         };
         let share = |totals: Totals| totals.wasted_bytes() as f64 / totals.bytes as f64;
         let (with, without) = (run(true), run(false));
-        println!("{link}: {:.3}, {:.3} without; {with:?}", share(with), share(without));
         assert!(with.cancelled > 5, "{link}: {with:?}");
         assert!(share(with) < 0.1, "{link}: {:.3} of {} bytes", share(with), with.bytes);
         assert!(share(with) < share(without), "{link}: {} {}", share(with), share(without));

@@ -24,6 +24,7 @@ fn built(folder: &Path, input: &str) -> PathBuf {
         drop_attributes: vec![],
         columns: None,
         scale: None,
+        cells_per_spacing: crate::CELLS_PER_SPACING,
         cancel: Arc::default(),
     };
     build(&config, &Quiet).expect("built");
