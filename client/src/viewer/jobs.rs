@@ -10,7 +10,7 @@ use std::{
 
 use lodestream_server::DatasetIndex;
 
-use super::point_values::Values;
+use super::{picking::Picked, point_values::Known};
 use crate::path::CameraPath;
 
 /// What a job ends with.
@@ -23,12 +23,14 @@ pub enum Answer {
         /// The list, or why there is none.
         index: Result<DatasetIndex, String>,
     },
-    /// All attributes of a picked point.
+    /// Position and attributes of a picked point.
     Values {
         /// Which pick they are of.
         pick: u64,
-        /// The values, or why there are none.
-        values: Result<Values, String>,
+        /// The point, as it was picked.
+        point: Picked,
+        /// What is known of it, or why nothing is.
+        known: Result<Known, String>,
     },
     /// A picture was written.
     Picture {

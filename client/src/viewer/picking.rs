@@ -21,7 +21,10 @@ pub struct Picked {
     pub key: NodeKey,
     /// Which of the node's points.
     pub point: usize,
-    /// World coordinates, as the dataset has them.
+    /// Whether the coordinates are those of the dataset. Else they are those of the middle of the cell that
+    /// the point was drawn in.
+    pub is_exact: bool,
+    /// World coordinates.
     pub world: [f64; 3],
     /// The same as text, with as many decimals as the dataset has.
     pub text: [String; 3],
@@ -32,6 +35,15 @@ impl Picked {
     #[must_use]
     pub fn place(&self) -> DVec3 {
         self.world.into()
+    }
+
+    /// Puts the point where it lies in its node, lattice units.
+    pub fn put(&mut self, lattice: &Lattice, within_node: [u32; 3]) {
+        let corner = lattice.node_min(self.key);
+        let q = std::array::from_fn(|axis| corner[axis].saturating_add(within_node[axis]));
+        self.world = lattice.world(q);
+        let decimals = decimals(lattice);
+        self.text = self.world.map(|c| coordinate(c, decimals));
     }
 }
 
@@ -48,19 +60,16 @@ pub fn pick(
     let scene = Scene { clouds: &plan.clouds, nodes: &shown.nodes };
     let Some(seen) = CpuRenderer.seen(&scene, settings, at, REACH_PX)? else { return Ok(None) };
     let node = &shown.nodes[seen.node];
-    let lattice = &plan.clouds[node.cloud].lattice;
-    let corner = lattice.node_min(node.key);
-    let q = node.points.positions[seen.point];
-    let q = std::array::from_fn(|axis| corner[axis].saturating_add(q[axis]));
-    let world = lattice.world(q);
-    let decimals = decimals(lattice);
-    Ok(Some(Picked {
+    let mut picked = Picked {
         cloud: node.cloud,
         key: node.key,
         point: shown.original(seen.node, seen.point),
-        world,
-        text: world.map(|c| coordinate(c, decimals)),
-    }))
+        is_exact: node.points.cell_bits == 0,
+        world: [0.0; 3],
+        text: Default::default(),
+    };
+    picked.put(&plan.clouds[node.cloud].lattice, node.points.positions[seen.point]);
+    Ok(Some(picked))
 }
 
 /// Decimals that tell all coordinates of a lattice apart; `None` where it is not one of decimal steps.

@@ -1,6 +1,6 @@
 //! All attributes of one point: what is not part of the picture is fetched for its node.
 
-use lodestream_protocol::{Dataset, Manifest, NodeKey, NodePoints, ReadAt, ScalarType};
+use lodestream_protocol::{Dataset, Lattice, Manifest, NodeKey, NodePoints, ReadAt, ScalarType};
 
 use crate::source::{BlockingSource, Source};
 
@@ -10,11 +10,23 @@ const MOST_COMPONENTS: usize = 8;
 /// Names and values, in the dataset's order.
 pub type Values = Vec<(String, String)>;
 
-/// Reads all attributes of a point. Waits for the source: not for the window's thread.
+/// What is known of a point.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Known {
+    /// All attributes.
+    pub values: Values,
+    /// Where it lies in its node, lattice units.
+    pub within_node: Option<[u32; 3]>,
+    /// The lattice of its dataset.
+    pub lattice: Option<Lattice>,
+}
+
+/// Reads position and attributes of a point, to the last bit. Waits for the source: not for the window's
+/// thread.
 ///
 /// # Errors
 /// What went wrong, for people.
-pub fn fetch(source: &str, key: NodeKey, point: usize) -> Result<Values, String> {
+pub fn fetch(source: &str, key: NodeKey, point: usize) -> Result<Known, String> {
     let source = Source::parse(source).map_err(|e| e.to_string())?;
     let source = BlockingSource::new(source).map_err(|e| e.to_string())?;
     let dataset = Dataset::open(source).map_err(|e| e.to_string())?;
@@ -25,11 +37,16 @@ fn read<R: ReadAt>(
     dataset: &Dataset<R>,
     key: NodeKey,
     point: usize,
-) -> lodestream_protocol::Result<Values> {
-    let Some(node) = dataset.node(key)? else { return Ok(Vec::new()) };
-    let groups: Vec<_> = (1..dataset.manifest().groups.len()).collect();
+) -> lodestream_protocol::Result<Known> {
+    let Some(node) = dataset.node(key)? else { return Ok(Known::default()) };
+    let manifest = dataset.manifest();
+    let groups: Vec<_> = (1..manifest.groups.len()).collect();
     let points = dataset.read_node(&node, &groups)?;
-    Ok(values(dataset.manifest(), &points, point))
+    Ok(Known {
+        values: values(manifest, &points, point),
+        within_node: points.positions.get(point).copied(),
+        lattice: Some(manifest.lattice),
+    })
 }
 
 /// The values of a point, as far as they are there.

@@ -23,7 +23,7 @@ use super::{
     open_dialog::OpenDialog,
     options::ViewOptions,
     picking::Picked,
-    point_values::{self, Values},
+    point_values::{self, Known, Values},
     recording::{Player, Recorder},
     session::{Bookmark, Session},
     settings::Settings,
@@ -53,6 +53,8 @@ pub struct Pick {
     pub number: u64,
     /// The point.
     pub point: Picked,
+    /// Whether something is measured up to it.
+    pub ends_measurement: bool,
     /// Its attributes, once they are there.
     pub values: Option<Result<Values, String>>,
 }
@@ -449,13 +451,7 @@ impl Viewer {
                     self.events.tell("list", json!({ "server": server, "datasets": found.ok() }));
                     self.open_dialog.end_list(server, index);
                 }
-                Answer::Values { pick, values } => {
-                    if let Some(picked) = self.picked.as_mut().filter(|p| p.number == pick) {
-                        let told = json!({ "values": values.as_ref().ok() });
-                        self.events.tell("values", told);
-                        picked.values = Some(values);
-                    }
-                }
+                Answer::Values { pick, point, known } => self.know(pick, &point, known),
                 Answer::Picture { file, exported, outcome } => {
                     self.events
                         .tell("picture", json!({ "file": file, "error": outcome.as_ref().err() }));
@@ -484,33 +480,74 @@ impl Viewer {
     pub fn set_picked(&mut self, point: Picked) {
         self.picks += 1;
         let number = self.picks;
-        let cloud = &self.clouds[point.cloud];
-        self.events.tell(
-            "picked",
-            json!({
-                "cloud": point.cloud, "world": point.world, "text": point.text,
-                "level": point.key.level(), "crs": cloud.crs.name,
-            }),
-        );
-        let (source, key, index) = (cloud.source.clone(), point.key, point.point);
+        let (source, picked) = (self.clouds[point.cloud].source.clone(), point.clone());
         self.jobs.start(move || Answer::Values {
             pick: number,
-            values: point_values::fetch(&source, key, index),
+            known: point_values::fetch(&source, picked.key, picked.point),
+            point: picked,
         });
+        let mut ends_measurement = false;
         if let Tool::Measure(from) = &mut self.tool {
             match from.take() {
                 None => *from = Some(point.world),
                 Some(start) => {
-                    let measured = Measurement { from: start, to: point.world };
-                    self.measurements.push(measured);
-                    self.events.tell(
-                        "measured",
-                        json!({ "distance": measured.distance(), "height": measured.height() }),
-                    );
+                    self.measurements.push(Measurement { from: start, to: point.world });
+                    ends_measurement = true;
                 }
             }
         }
-        self.picked = Some(Pick { number, point, values: None });
+        let is_exact = point.is_exact;
+        self.picked = Some(Pick { number, point, ends_measurement, values: None });
+        if is_exact {
+            self.tell_picked();
+        }
+    }
+
+    /// Takes in what was fetched of a point, which may have been drawn in the middle of its cell.
+    fn know(&mut self, pick: u64, point: &Picked, known: Result<Known, String>) {
+        let mut exact = point.clone();
+        if let Ok(Known { within_node: Some(q), lattice: Some(lattice), .. }) = &known {
+            exact.put(lattice, *q);
+            exact.is_exact = true;
+        }
+        let refine = |place: &mut [f64; 3]| {
+            if *place == point.world {
+                *place = exact.world;
+            }
+        };
+        if let Tool::Measure(Some(from)) = &mut self.tool {
+            refine(from);
+        }
+        for measured in &mut self.measurements {
+            refine(&mut measured.from);
+            refine(&mut measured.to);
+        }
+        let Some(picked) = self.picked.as_mut().filter(|p| p.number == pick) else { return };
+        picked.point = exact;
+        let values = known.map(|known| known.values);
+        let told = json!({ "values": values.as_ref().ok() });
+        picked.values = Some(values);
+        if !point.is_exact {
+            self.tell_picked();
+        }
+        self.events.tell("values", told);
+    }
+
+    fn tell_picked(&self) {
+        let Some(Pick { point, ends_measurement, .. }) = &self.picked else { return };
+        self.events.tell(
+            "picked",
+            json!({
+                "cloud": point.cloud, "world": point.world, "text": point.text,
+                "is_exact": point.is_exact,
+                "level": point.key.level(), "crs": self.clouds[point.cloud].crs.name,
+            }),
+        );
+        let mut measured = self.measurements.iter().rev();
+        if let Some(measured) = measured.find(|m| *ends_measurement && m.to == point.world) {
+            let told = json!({ "distance": measured.distance(), "height": measured.height() });
+            self.events.tell("measured", told);
+        }
     }
 
     /// Plays a path from its begin.

@@ -40,7 +40,9 @@ fn show_picked(viewer: &mut Viewer, ui: &mut Ui, palette: Palette) {
     for (name, text) in ["x", "y", "z"].iter().zip(&pick.point.text) {
         ui.horizontal(|ui| {
             ui.label(RichText::new(*name).color(palette.faint));
-            ui.label(RichText::new(text).monospace().size(13.5));
+            // Until it is known where in its cell the point lies.
+            let about = if pick.point.is_exact { "" } else { "≈ " };
+            ui.label(RichText::new(format!("{about}{text}")).monospace().size(13.5));
         });
     }
     ui.label(RichText::new(cloud.crs.title()).color(palette.faint).small());
