@@ -57,7 +57,7 @@ def read_index(file):
     (major, minor, header_bytes, manifest_bytes, root_page_bytes, boot_bytes, file_bytes, content_id, index_crc,
      header_crc) = struct.unpack("<HHIIIQQ16sII", header[8:])
     require(header_crc == zlib.crc32(header[:60]), "the header is damaged")
-    require(major <= 1, f"version {major}.{minor} is newer than this reader")
+    require(major <= 2, f"version {major}.{minor} is newer than this reader")
     require(header_bytes == 64, "the header has another length")
     require(file_bytes == file.seek(0, 2), "the file has another length than its header says")
     end = 64 + manifest_bytes + root_page_bytes

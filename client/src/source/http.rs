@@ -420,11 +420,18 @@ impl HttpSource {
                         .of(Fault::WholeFile),
                 };
             }
-            StatusCode::RANGE_NOT_SATISFIABLE => self.permanent(format!(
-                "bytes {} to {} are beyond the end of the file: it is empty or cut short",
-                ask.offset,
-                ask.offset + ask.len
-            )),
+            StatusCode::RANGE_NOT_SATISFIABLE => {
+                // Another file may stand there now, and be shorter.
+                let found = Identity::of(response.headers(), total_of_unsatisfied(response));
+                if self.inner.identity.get().is_some_and(|first| first.differs_from(&found)) {
+                    return self.changed();
+                }
+                self.permanent(format!(
+                    "bytes {} to {} are beyond the end of the file: it is empty or cut short",
+                    ask.offset,
+                    ask.offset + ask.len
+                ))
+            }
             StatusCode::NOT_FOUND | StatusCode::GONE => self.permanent(format!(
                 "not found ({status}); check the address, and the token or link if it needs one"
             )),
@@ -466,6 +473,12 @@ impl HttpSource {
     fn permanent(&self, message: impl Into<String>) -> SourceError {
         SourceError::permanent(&self.inner.place, message)
     }
+}
+
+/// The length of the file, by an answer that a range lies beyond it: `bytes */TOTAL`.
+fn total_of_unsatisfied(response: &Response) -> Option<u64> {
+    let text = response.headers().get(header::CONTENT_RANGE)?.to_str().ok()?;
+    text.strip_prefix("bytes */")?.parse().ok()
 }
 
 impl Identity {

@@ -245,7 +245,10 @@ async fn reply(
         return send(stream, &slice(0, len)).await;
     }
     if start >= end {
-        return send(stream, &head(416, 0, None, "")).await;
+        let mut beyond = head(416, 0, None, "");
+        let line = format!("Content-Range: bytes */{len}\r\n\r\n");
+        beyond.splice(beyond.len() - 2.., line.into_bytes());
+        return send(stream, &beyond).await;
     }
     let good = head(206, end - start, Some((start, end, len)), "\"first\"");
     let body = slice(start, end);

@@ -55,7 +55,8 @@ impl World {
             drop_attributes: Vec::new(),
             columns: None,
             scale: None,
-            cells_per_spacing: lodestream_preprocess::CELLS_PER_SPACING,
+            // In two parts, the first request would bring all of so small a scan.
+            cells_per_spacing: 0,
             cancel: Default::default(),
         };
         build(&config, &Silent).expect("built");

@@ -184,7 +184,10 @@ fn per_point(bytes: u64, manifest: &Manifest) -> f64 {
 fn groups(manifest: &Manifest) -> Vec<GroupDescription> {
     let describe = |(index, group): (usize, &GroupInfo)| {
         let position = (index == 0).then_some("position");
-        let names = position.into_iter().chain(manifest.columns_of(index).map(|a| &*a.name));
+        let is_fine = manifest.fine.is_some_and(|fine| fine.group == index);
+        let fine = is_fine.then_some("position, fine");
+        let names =
+            position.into_iter().chain(fine).chain(manifest.columns_of(index).map(|a| &*a.name));
         let columns = names.zip(&group.columns).map(|(name, &bytes)| ColumnDescription {
             name: name.to_owned(),
             bytes,

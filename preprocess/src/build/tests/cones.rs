@@ -50,6 +50,7 @@ proptest! {
         let [file, ..] = files;
         let dataset = Dataset::open(file).expect("a dataset");
         let nodes = dataset.hierarchy().expect("nodes");
+        let groups: Vec<usize> = (0..dataset.manifest().groups.len()).collect();
         let Some(index) = dataset.manifest().attributes.iter().position(|a| a.group().is_some()) else {
             prop_assert!(nodes.iter().all(|n| n.normal_cone.is_none()), "the same normal everywhere");
             return Ok(());
@@ -57,7 +58,7 @@ proptest! {
         let cones: HashMap<NodeKey, NormalCone> =
             nodes.iter().map(|n| (n.key, n.normal_cone.expect("a cone"))).collect();
         for node in nodes.iter().filter(|node| node.points > 0) {
-            let decoded = dataset.read_node(node, &[0, 1]).expect("decodes");
+            let decoded = dataset.read_node(node, &groups).expect("decodes");
             for normal in decoded.column(index).expect("stored").bytes.chunks_exact(12) {
                 let normal = std::array::from_fn(|a| ScalarType::F32.to_f64(&normal[4 * a..]));
                 for level in 0..=node.key.level() {
