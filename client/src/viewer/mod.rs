@@ -3,7 +3,7 @@
 //! The window's thread is the engine's caller (Fraiss 2017, 3.2: the render thread). It publishes the
 //! newest camera, takes the newest plan, draws, and never waits for the network: what must be asked for besides
 //! the picture (a server's list, all attributes of a point that was picked) is asked by short-lived helper threads
-//! ([`jobs`]). It draws on demand: input, a new plan or something that moves wakes it; at rest it sleeps.
+//! (`jobs.rs`). It draws on demand: input, a new plan or something that moves wakes it; at rest it sleeps.
 //!
 //! - `app.rs`: the event loop; `display.rs`: the window, the GPU, what shows pictures in it;
 //! - `state.rs`: what the program knows; `frame.rs`: from a plan to a picture; `view.rs`: the part of the

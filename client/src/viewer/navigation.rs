@@ -3,7 +3,7 @@
 //! The camera is a pivot, two angles and a distance, whatever it is moved by: turning around the pivot
 //! (as CloudCompare and Potree do), looking around (which moves the pivot around the eye), walking,
 //! panning, coming nearer to what is under the cursor. Every gesture changes the goal at once; what is
-//! shown follows it, two thirds of the way in [`FOLLOW_SECONDS`], and is the goal when no pixel is apart any
+//! shown follows it, two thirds of the way in `FOLLOW_SECONDS`, and is the goal when no pixel is apart any
 //! more. From then on nothing moves and nothing has to be drawn.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

@@ -112,7 +112,7 @@ impl Session {
     /// Reads a session file. Files that it names as relative paths lie beside it.
     ///
     /// # Errors
-    /// [`StoredError`] where it cannot be read or is no session.
+    /// `StoredError` where it cannot be read or is no session.
     pub fn open(path: &Path) -> Result<Self, StoredError> {
         let bad = |why: String| StoredError::Bad { path: path.to_owned(), why };
         let value: serde_json::Value = stored::read(path)?;
@@ -145,7 +145,7 @@ impl Session {
     /// Writes the session file.
     ///
     /// # Errors
-    /// [`StoredError::Write`].
+    /// `StoredError::Write`.
     pub fn save(&self, path: &Path) -> Result<(), StoredError> {
         stored::write(path, self)
     }

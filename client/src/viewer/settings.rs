@@ -113,7 +113,7 @@ impl Settings {
     /// Keeps them.
     ///
     /// # Errors
-    /// [`StoredError::Write`].
+    /// `StoredError::Write`.
     pub fn keep(&self, path: &Path) -> Result<(), StoredError> {
         stored::write(path, self)
     }

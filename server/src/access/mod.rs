@@ -7,7 +7,7 @@
 //! to a dataset, because the rules are asked before the folder is.
 //!
 //! Two ways to have a right, besides what is public: a bearer token, for programs that keep one,
-//! and a signed address, for handing on ([`signature`]). Tokens are never taken from an address:
+//! and a signed address, for handing on (`signature.rs`). Tokens are never taken from an address:
 //! those end up in logs, histories and referrers.
 
 mod pattern;
