@@ -67,7 +67,10 @@ def read_index(file):
     root_page = file.read(root_page_bytes)
     require(index_crc == zlib.crc32(manifest + root_page), "the index is damaged")
     manifest = json.loads(manifest)
-    sizes = [[0] * (int(group == 0) + len(group_columns(manifest, group))) for group in range(len(manifest["groups"]))]
+    fine_group = manifest["fine"]["group"] if "fine" in manifest else None
+    with_positions = (0, fine_group)
+    groups = range(len(manifest["groups"]))
+    sizes = [[0] * (int(group in with_positions) + len(group_columns(manifest, group))) for group in groups]
     return Index(manifest, root_page, end, content_id.hex(), sizes)
 
 
