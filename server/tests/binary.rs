@@ -108,7 +108,7 @@ fn a_built_dataset_is_sound_and_described_in_full() {
     let reported: BTreeMap<_, _> = reported.iter().map(column).collect();
     assert_eq!(bytes, reported);
     assert_eq!(
-        bytes.iter().map(|(_, b)| b.as_u64().expect("a number")).sum::<u64>(),
+        bytes.values().map(|b| b.as_u64().expect("a number")).sum::<u64>(),
         sum("groups", "bytes")
     );
     assert_eq!(json["bounds"]["min"][0], 500.0);
