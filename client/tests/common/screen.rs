@@ -98,6 +98,17 @@ struct Told {
     is_over: bool,
 }
 
+impl Told {
+    /// The middle of a widget, if it is there.
+    fn middle_of(&self, role: &str, label: &str) -> Option<[i64; 2]> {
+        let widgets = self.widgets.as_array()?;
+        let found = widgets.iter().find(|widget| widget[0] == role && widget[1] == label)?;
+        let side = |index: usize| found[2][index].as_f64();
+        let (x, y) = (side(0)? + side(2)?, side(1)? + side(3)?);
+        Some([(x / 2.0) as i64, (y / 2.0) as i64])
+    }
+}
+
 /// The program in its window.
 pub struct Window<'a> {
     screen: &'a Screen,
@@ -222,13 +233,12 @@ impl<'a> Window<'a> {
 
     /// The middle of a widget, once it is there.
     fn widget(&self, role: &str, label: &str) -> [i64; 2] {
-        self.wait_for(&format!("{role} {label:?}"), |told| {
-            let widgets = told.widgets.as_array()?;
-            let found = widgets.iter().find(|widget| widget[0] == role && widget[1] == label)?;
-            let side = |index: usize| found[2][index].as_f64();
-            let (x, y) = (side(0)? + side(2)?, side(1)? + side(3)?);
-            Some([(x / 2.0) as i64, (y / 2.0) as i64])
-        })
+        self.wait_for(&format!("{role} {label:?}"), |told| told.middle_of(role, label))
+    }
+
+    /// The middle of a widget, if it is there at the moment.
+    fn widget_now(&self, role: &str, label: &str) -> Option<[i64; 2]> {
+        self.told.0.lock().unwrap_or_else(PoisonError::into_inner).middle_of(role, label)
     }
 
     /// Waits until a widget is there.
@@ -238,26 +248,34 @@ impl<'a> Window<'a> {
 
     /// Whether a widget is there at the moment.
     pub fn has_widget(&self, role: &str, label: &str) -> bool {
-        let told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let widgets = told.widgets.as_array().into_iter().flatten();
-        widgets.into_iter().any(|widget| widget[0] == role && widget[1] == label)
+        self.widget_now(role, label).is_some()
     }
 
     /// Clicks a widget.
     pub fn press(&mut self, role: &str, label: &str) {
+        loop {
+            let at = self.widget(role, label);
+            if self.press_at(role, label, at) {
+                return;
+            }
+        }
+    }
+
+    /// Clicks a widget that was there; `false` where it is gone.
+    fn press_at(&mut self, role: &str, label: &str, mut at: [i64; 2]) -> bool {
         // Sections of the panel open smoothly: a hand follows what moves.
-        let mut at = self.widget(role, label);
         loop {
             let [x, y] = at.map(|c| c.to_string());
             self.screen.hand(&["mousemove", &x, &y, "sleep", "0.4"]);
-            let now = self.widget(role, label);
-            if now == at {
-                break;
+            match self.widget_now(role, label) {
+                None => return false,
+                Some(now) if now == at => break,
+                Some(now) => at = now,
             }
-            at = now;
         }
         self.forget_past();
         self.click_at(at[0], at[1], 1);
+        true
     }
 
     /// Chooses an entry of a list that folds out. Where another list is still folding in, the first click
@@ -267,8 +285,10 @@ impl<'a> Window<'a> {
             self.press("ComboBox", list);
             let end = Instant::now() + Duration::from_secs(3);
             while Instant::now() < end {
-                if self.has_widget("Button", entry) {
-                    self.press("Button", entry);
+                // A slow window may fold the list in again meanwhile.
+                if let Some(at) = self.widget_now("Button", entry)
+                    && self.press_at("Button", entry, at)
+                {
                     return;
                 }
                 self.screen.hand(&["sleep", "0.05"]);

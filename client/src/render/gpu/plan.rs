@@ -9,7 +9,7 @@ use super::{
     device::Device,
     layout::{ChunkEntry, NodeUniform, packed_color},
     pack::{RecordFields, RecordLayout},
-    pool::Pool,
+    pool::{Found, Pool},
 };
 use crate::{
     engine::DrawNode,
@@ -133,10 +133,9 @@ impl Plan {
         // What takes no payload shares its records.
         let payload = if color.payload_bits() == 0 { ColorSource::Node } else { color };
         let fields = RecordFields { color: payload, normals, shape };
-        let Some(resident) = pool.node(device, cloud, node, fields, &colors, &surface) else {
-            self.waiting_nodes += 1;
-            return;
-        };
+        let found = pool.node(device, cloud, node, fields, &colors, &surface);
+        self.waiting_nodes += u64::from(found.as_ref().is_none_or(|found| found.is_waiting));
+        let Some(Found { resident, .. }) = found else { return };
         self.points += points.positions.len() as u64;
 
         let RecordLayout { min, max, shape_unit, .. } = resident.layout;

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use lodestream_protocol::{Manifest, NodeKey};
+use lodestream_protocol::{Manifest, NodeKey, NodePoints};
 use lodestream_shaders::CHUNK_POINTS;
 use lru::LruCache;
 
@@ -43,6 +43,8 @@ pub struct Piece {
 pub struct Resident {
     pub layout: RecordLayout,
     pub pieces: Vec<Piece>,
+    /// How exactly its points are placed.
+    cell_bits: u8,
     frame: u64,
     /// Keeps the address that stands for the cloud in the key from being used again.
     _cloud: Arc<Manifest>,
@@ -54,11 +56,18 @@ struct Key {
     /// Address of the manifest: what a cloud is known by as long as anything of it is here.
     cloud: usize,
     node: NodeKey,
-    /// How exactly its points are placed.
-    cell_bits: u8,
     /// Which of the node's points.
     part: u64,
     fields: RecordFields,
+}
+
+/// A node that can be drawn.
+pub struct Found<'a> {
+    /// Where it is.
+    pub resident: &'a Resident,
+    /// Whether its points are placed less exactly, or more, than was asked for: what was asked for must
+    /// wait for another frame.
+    pub is_waiting: bool,
 }
 
 /// Nodes on the GPU.
@@ -125,7 +134,8 @@ impl Pool {
     }
 
     /// A node of `cloud` with records of `fields`, uploaded if it is not there yet; `None` where
-    /// that must wait for another frame.
+    /// that must wait for another frame. Until a node whose points are placed more exactly can be uploaded,
+    /// the one that it replaces is there still: what was seen does not go away.
     pub fn node(
         &mut self,
         device: &Device,
@@ -134,36 +144,52 @@ impl Pool {
         fields: RecordFields,
         colors: &NodeColor,
         surface: &NodeSurface,
-    ) -> Option<&Resident> {
+    ) -> Option<Found<'_>> {
         let points = node.points.as_ref();
-        let key = Key {
-            cloud: Arc::as_ptr(cloud).addr(),
-            node: points.key,
-            part: node.part,
-            cell_bits: points.cell_bits,
-            fields,
-        };
-        if !self.nodes.contains(&key) {
-            if self.uploaded_bytes >= self.upload_bytes_per_frame {
-                return None;
-            }
-            let layout = RecordLayout::of(points, fields, surface);
-            let words = pack(points, &layout, colors, surface);
-            let bytes = words.len() as u64 * 4;
-            // One node at least, however large.
-            if self.uploaded_bytes > 0
-                && self.uploaded_bytes.saturating_add(bytes) > self.upload_bytes_per_frame
-            {
-                return None;
-            }
-            let pieces = self.upload(device, points.positions.len(), &layout, &words);
-            let resident = Resident { layout, pieces, frame: 0, _cloud: Arc::clone(cloud) };
-            self.nodes.put(key, resident);
-        }
+        let key =
+            Key { cloud: Arc::as_ptr(cloud).addr(), node: points.key, part: node.part, fields };
+        // One that this frame draws already stays as it is.
+        let replaced = self.nodes.peek(&key).filter(|old| old.cell_bits != points.cell_bits);
+        let replaced = replaced.map(|old| old.frame != self.frame);
+        let is_wanted = replaced.unwrap_or_else(|| !self.nodes.contains(&key));
+        let is_new = is_wanted && self.enter(device, key, cloud, points, colors, surface);
+        let is_waiting = replaced.is_some() && !is_new;
         let frame = self.frame;
-        let resident = self.nodes.get_mut(&key).expect("just put there where it was missing");
+        let resident = self.nodes.get_mut(&key)?;
         resident.frame = frame;
-        Some(resident)
+        Some(Found { resident, is_waiting })
+    }
+
+    /// Uploads a node in place of what is there; `false` where that must wait for another frame.
+    fn enter(
+        &mut self,
+        device: &Device,
+        key: Key,
+        cloud: &Arc<Manifest>,
+        points: &NodePoints,
+        colors: &NodeColor,
+        surface: &NodeSurface,
+    ) -> bool {
+        if self.uploaded_bytes >= self.upload_bytes_per_frame {
+            return false;
+        }
+        let layout = RecordLayout::of(points, key.fields, surface);
+        let words = pack(points, &layout, colors, surface);
+        let bytes = words.len() as u64 * 4;
+        // One node at least, however large.
+        if self.uploaded_bytes > 0
+            && self.uploaded_bytes.saturating_add(bytes) > self.upload_bytes_per_frame
+        {
+            return false;
+        }
+        if let Some(old) = self.nodes.pop(&key) {
+            self.release(old);
+        }
+        let pieces = self.upload(device, points.positions.len(), &layout, &words);
+        let cell_bits = points.cell_bits;
+        let resident = Resident { layout, pieces, cell_bits, frame: 0, _cloud: Arc::clone(cloud) };
+        self.nodes.put(key, resident);
+        true
     }
 
     fn upload(
@@ -248,12 +274,17 @@ impl Pool {
             return false;
         }
         let Some((_, oldest)) = self.nodes.pop_lru() else { return false };
-        for piece in oldest.pieces {
+        self.release(oldest);
+        true
+    }
+
+    /// Gives back the room of a node that is no longer drawn.
+    fn release(&mut self, node: Resident) {
+        for piece in node.pieces {
             if let Some(page) = &mut self.pages[piece.page] {
                 page.free.give(piece.first_word, piece.words);
             }
             self.resident_bytes -= u64::from(piece.words) * 4;
         }
-        true
     }
 }

@@ -66,6 +66,46 @@ fn a_frame_uploads_no_more_than_it_may_until_all_is_there() {
 }
 
 #[test]
+fn what_is_placed_more_exactly_replaces_what_was_seen_and_nothing_is_missing_meanwhile() {
+    if !has_gpu() {
+        return;
+    }
+    let exact = small_world();
+    // A cloud is known by its manifest's address.
+    let mut rough = TestScene { clouds: exact.clouds.clone(), ..small_world() };
+    for node in &mut rough.nodes {
+        let mut points = node.points.as_ref().clone();
+        points.cell_bits = 4;
+        points.positions.iter_mut().flatten().for_each(|q| *q = *q & !15 | 8);
+        node.points = Arc::new(points);
+    }
+    let settings = settings(looking_at_landscape());
+    let [roughly, exactly] = [&rough, &exact]
+        .map(|world| open_gpu(64 << 20).render(&world.scene(), &settings).expect("drawn"));
+    assert_ne!(roughly.picture, exactly.picture);
+    // A node a frame.
+    let config = GpuConfig { upload_bytes_per_frame: 1, ..GpuConfig::default() };
+    let mut gpu = GpuRenderer::new(config).unwrap_or_else(|e| panic!("{e}"));
+    let mut complete = |world: &TestScene, least_points: u64| {
+        for frames in 1..200 {
+            let frame = gpu.render(&world.scene(), &settings).expect("drawn");
+            assert!(frame.statistics.points >= least_points, "frame {frames} lacks points");
+            if frame.statistics.waiting_nodes == 0 {
+                return (frames, frame);
+            }
+        }
+        panic!("never complete");
+    };
+    let all = exactly.statistics.points;
+    assert_eq!(complete(&rough, 0).1.picture, roughly.picture);
+    let (frames, refined) = complete(&exact, all);
+    assert_eq!(refined.picture, exactly.picture);
+    assert_eq!(frames, exact.nodes.len());
+    assert_eq!(refined.statistics.resident_bytes, exactly.statistics.resident_bytes);
+    assert_eq!(complete(&rough, all).1.picture, roughly.picture, "and back");
+}
+
+#[test]
 fn a_lost_gpu_is_opened_anew_and_draws_the_same() {
     if !has_gpu() {
         return;
