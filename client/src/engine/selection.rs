@@ -1,7 +1,8 @@
 //! Which nodes a view wants: one walk over the trees of all clouds, most important first.
 //!
 //! The result depends on the view, the trees and the previous view's selection only, not on what
-//! is loaded: so the same camera settles on the same picture whatever the network did. (Which nodes are
+//! is loaded: so the same camera settles on the same nodes whatever the network did, placed as exactly as it shows; those
+//! that were seen from nearer stay exact while they are kept. (Which nodes are
 //! left out as hidden does depend on the depths that came back; the picture does not.) It does not
 //! depend on the order in which hierarchy pages arrive either, because a child's priority is capped
 //! to its parent's and a page is as important as the node above it: what lies below an unloaded

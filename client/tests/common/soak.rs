@@ -21,7 +21,7 @@ use lodestream_client::{
 };
 
 use super::{
-    drawn::{Picture, picture},
+    drawn::{Picture, cells, picture, picture_in},
     host::{Answer, Host},
 };
 
@@ -70,7 +70,7 @@ pub struct Outcome {
     /// At the end, looking away: kept, and the limit.
     pub cached_bytes: u64,
     pub cache_limit: u64,
-    /// At the end.
+    /// At the end, no more exactly placed than what is expected.
     pub picture: Picture,
     pub expected: Picture,
     pub stats: EngineStats,
@@ -169,8 +169,8 @@ impl Soak {
             most_bytes,
             cached_bytes,
             cache_limit,
-            picture: picture(&plan),
-            expected,
+            picture: picture_in(&plan, &cells(&expected)),
+            expected: picture(&expected),
             stats: engine.stats(),
         })
     }
@@ -196,12 +196,11 @@ impl Soak {
     }
 
     /// What a cold start from files settles on.
-    fn expected(&self, files: [&PathBuf; 2], view: View) -> Result<Picture, EngineError> {
+    fn expected(&self, files: [&PathBuf; 2], view: View) -> Result<Arc<FramePlan>, EngineError> {
         let source = |path: &PathBuf| Source::parse(path.to_str().expect("a path")).expect("opens");
         let engine = Engine::start(files.map(source).into(), self.config())?;
         engine.set_view(view);
-        let plan = settle(&engine)?;
-        Ok(picture(&plan))
+        settle(&engine)
     }
 }
 
