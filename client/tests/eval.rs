@@ -1,11 +1,19 @@
 //! `lodestream eval`: the real binary, from an input to reports, and two reports side by side.
 
+#[path = "common/world.rs"]
+mod world;
+
 use std::{
     path::Path,
     process::{Command, Output},
 };
 
-use lodestream_client::eval::Report;
+use lodestream_client::{
+    engine::Policy,
+    eval::{BuildRow, Report, SavingRow},
+};
+
+use world::World;
 
 fn eval(args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lodestream"));
@@ -56,7 +64,8 @@ const SMALL: &str = "sim:courtyard?points=60k&seed=3";
 fn a_report_is_written_and_repeats_to_the_last_digit() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let folders = ["first", "second"].map(|name| folder.path().join(name));
-    let options = ["--quick", "--sizes", "near,far", "--budgets", "5000,100000"];
+    let options =
+        ["--quick", "--sizes", "near,far", "--budgets", "5000,100000", "--paths", "orbit"];
     for output in &folders {
         let output = output.display().to_string();
         evaluated(&[&[SMALL, "-o", &output], &options[..]].concat());
@@ -98,6 +107,14 @@ fn a_report_is_written_and_repeats_to_the_last_digit() {
     compares(&folders[0], &first);
 }
 
+fn build(report: &mut Report) -> &mut BuildRow {
+    report.subjects[0].build.as_mut().expect("it was built")
+}
+
+fn saving(report: &mut Report) -> &mut SavingRow {
+    &mut report.subjects[0].left_out[0]
+}
+
 /// A report against itself, and against worse ones.
 fn compares(folder: &Path, report: &Report) {
     let before = folder.join("eval.json").display().to_string();
@@ -115,7 +132,7 @@ fn compares(folder: &Path, report: &Report) {
     assert!(said.starts_with("0 worse or gone, 0 different"), "{said}");
 
     type Worse<'a> = (&'a str, &'a dyn Fn(&mut Report));
-    let worse: [Worse; 5] = [
+    let worse: [Worse; 14] = [
         ("near point 1px 5000 ssim", &|r| {
             r.subjects[0].frames[0].error.ssim =
                 r.subjects[0].frames[0].error.ssim.map(|s| s - 0.01);
@@ -124,6 +141,17 @@ fn compares(folder: &Path, report: &Report) {
         ("ours settled_ms", &|r| r.subjects[0].streams[0].settled_ms = None),
         ("ours area", &|r| r.subjects[0].streams[0].samples.iter_mut().for_each(|s| s.ssim -= 0.1)),
         ("near point 1px 5000", &|r| drop(r.subjects[0].frames.remove(0))),
+        ("courtyard file bytes", &|r| r.subjects[0].bytes += r.subjects[0].bytes / 50),
+        ("build points lost", &|r| build(r).points_out -= 1),
+        ("build seconds", &|r| build(r).seconds *= 10.0),
+        ("build by poisson", &|r| r.subjects[0].build = None),
+        ("orbit by 20mbit/40ms ours mean_ssim", &|r| r.subjects[0].paths[0].mean_ssim -= 0.01),
+        ("orbit by 20mbit/40ms potree", &|r| {
+            r.subjects[0].paths.retain(|run| run.policy != Policy::Potree);
+        }),
+        ("near without behind what is drawn", &|r| saving(r).with.bytes *= 2),
+        ("GONE  courtyard near without behind", &|r| drop(r.subjects[0].left_out.remove(0))),
+        ("shader bytes", &|r| r.subjects[0].not_stored.shader_bytes[0] *= 2),
     ];
     for (what, change) in worse {
         let (code, said) = against(change);
@@ -136,8 +164,33 @@ fn compares(folder: &Path, report: &Report) {
     }
     let (code, said) = against(&|r| r.subjects[0].streams[0].bytes /= 2);
     assert_eq!(code, Some(0), "fewer bytes are no loss: {said}");
+    let (code, said) = against(&|r| {
+        build(r).seconds *= 10.0;
+        r.machine.push_str(", another");
+    });
+    assert_eq!(code, Some(0), "another machine takes other times: {said}");
     let (code, said) = against(&|r| r.seed += 1);
     assert!(code == Some(1) && said.contains("evaluate both alike"), "{said}");
+}
+
+#[test]
+fn a_hosted_dataset_is_evaluated_as_its_file_is() {
+    let mut world = World::new();
+    let narrow =
+        ["--quick", "--sizes", "medium", "--budgets", "1000", "--splats", "circle:2px", "-o"];
+    let [hosted, local] = ["hosted", "local"].map(|name| world.file(name));
+    evaluated(&[&[&*world.source()], &narrow[..], &[&hosted]].concat());
+    evaluated(&[&[&*world.file("courtyard.lods")], &narrow[..], &[&local]].concat());
+    let [hosted, local] = [hosted, local].map(|folder| report(Path::new(&folder)));
+    assert_eq!(hosted.subjects[0].name, "courtyard");
+    assert_eq!(repeatable(hosted), repeatable(local));
+
+    let absent = world.source().replace("courtyard", "absent");
+    assert!(refused(&[&absent, "-o", &world.file("out")], 1).contains("absent"));
+    assert!(refused(&["http://", "-o", &world.file("out")], 1).contains("not a URL"));
+    world.stop_server();
+    let dead = refused(&[&world.source(), "-o", &world.file("out")], 1);
+    assert!(dead.contains("courtyard"), "{dead}");
 }
 
 #[test]

@@ -20,7 +20,8 @@ use crate::{
 /// Measure error against run time: building, drawing, streaming, leaving out
 #[derive(Debug, Clone, Args)]
 pub struct EvalArgs {
-    /// Datasets (.lods), or anything that `build` takes, each built apart
+    /// Datasets: files, URLs, a server's address with a dataset's name; or anything that `build` takes,
+    /// each built apart
     #[arg(required_unless_present = "compare", value_name = "SOURCE|INPUT")]
     pub inputs: Vec<String>,
     /// Folder for eval.html, eval.json and tables of CSV; made if it is missing

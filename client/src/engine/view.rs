@@ -211,13 +211,12 @@ impl Optics {
     fn angle(&self, center: DVec3) -> f64 {
         let to_center = center - self.eye;
         let angle = match self.lens {
-            // Fraiss 2017, eq. 3.3. Rounding takes the cosine of a node straight ahead above 1.
-            Lens::Perspective { .. } => self
-                .basis
-                .forward
-                .dot(to_center.normalize_or(self.basis.forward))
-                .clamp(-1.0, 1.0)
-                .acos(),
+            // Fraiss 2017, eq. 3.3, but for the arc cosine: near the axis that has half the digits, and none
+            // where rounding takes the cosine above 1.
+            Lens::Perspective { .. } => {
+                let to = to_center.normalize_or(self.basis.forward);
+                self.basis.forward.cross(to).length().atan2(self.basis.forward.dot(to))
+            }
             // Parallel rays have no angles: the offset from the axis stands in, measured so that
             // the upper edge of the picture is at 45 degrees.
             Lens::Orthographic { half_height, .. } => {

@@ -5,8 +5,11 @@
 //! reports tell of themselves, and only where both are of one machine.
 
 use super::{
+    along::PathRun,
     curve::area,
-    report::{Report, SubjectReport},
+    frame::FrameRow,
+    left_out::SavingRow,
+    report::{BuildRow, Report, SubjectReport},
     stream::StreamRun,
 };
 
@@ -18,6 +21,9 @@ const GROWTH_ALLOWANCE: f64 = 0.01;
 
 /// Part by which times of the machine may grow beyond their own spread.
 const TIME_ALLOWANCE: f64 = 0.25;
+
+/// The same of builds, which are run once, and whose memory hangs on how threads fall.
+const BUILD_ALLOWANCE: f64 = 0.5;
 
 /// A figure in both reports.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +53,45 @@ pub fn compare(before: &Report, after: &Report) -> (Vec<Difference>, Vec<String>
     (differences, missing)
 }
 
+/// What is noted of a dataset's twins.
+struct Notes<'a> {
+    differences: &'a mut Vec<Difference>,
+    missing: &'a mut Vec<String>,
+    is_one_machine: bool,
+}
+
+impl Notes<'_> {
+    fn note(&mut self, what: String, before: f64, after: f64, is_regression: bool) {
+        if before != after {
+            self.differences.push(Difference { what, before, after, is_regression });
+        }
+    }
+
+    /// What is the same in every run and should be small: bytes, points, simulated times.
+    fn small(&mut self, what: String, before: f64, after: f64) {
+        self.note(what, before, after, grown(before, after, GROWTH_ALLOWANCE));
+    }
+
+    /// Similarities.
+    fn similar(&mut self, what: String, before: f64, after: f64) {
+        self.note(what, before, after, after < before - SSIM_ALLOWANCE);
+    }
+
+    /// What hangs on the machine: it counts beyond `allowance`, and where both reports are of one machine.
+    fn machine(&mut self, what: String, before: f64, after: f64, allowance: f64) {
+        let is_worse = self.is_one_machine && grown(before, after, allowance);
+        self.note(what, before, after, is_worse);
+    }
+
+    fn gone(&mut self, what: String) {
+        self.missing.push(what);
+    }
+}
+
+fn grown(before: f64, after: f64, allowance: f64) -> bool {
+    after > before * (1.0 + allowance)
+}
+
 fn subject(
     old: &SubjectReport,
     new: &SubjectReport,
@@ -54,30 +99,52 @@ fn subject(
     differences: &mut Vec<Difference>,
     missing: &mut Vec<String>,
 ) {
-    let mut note = |what: String, before: f64, after: f64, is_worse: bool| {
-        if before != after {
-            differences.push(Difference { what, before, after, is_regression: is_worse });
-        }
+    let notes = &mut Notes { differences, missing, is_one_machine };
+    builds(old, new, notes);
+    frames(old, new, notes);
+    streams(old, new, notes);
+    paths(old, new, notes);
+    savings(old, new, notes);
+}
+
+fn builds(old: &SubjectReport, new: &SubjectReport, notes: &mut Notes) {
+    let name = format!("{} build", old.name);
+    notes.small(format!("{} file bytes", old.name), old.bytes as f64, new.bytes as f64);
+    let (a, b) = match (&old.build, &new.build) {
+        (Some(a), Some(b)) if a.method == b.method => (a, b),
+        (Some(a), _) => return notes.gone(format!("{name} by {}", a.method)),
+        (None, _) => return,
     };
-    let grown = |before: f64, after: f64, allowance: f64| after > before * (1.0 + allowance);
+    // Points that are lost are worse, be it one.
+    let lost = |row: &BuildRow| row.points_in.saturating_sub(row.points_out) as f64;
+    notes.note(format!("{name} points lost"), lost(a), lost(b), lost(b) > lost(a));
+    notes.machine(format!("{name} seconds"), a.seconds, b.seconds, BUILD_ALLOWANCE);
+    if let (Some(x), Some(y)) = (a.peak_bytes, b.peak_bytes) {
+        notes.machine(format!("{name} peak_bytes"), x as f64, y as f64, BUILD_ALLOWANCE);
+    }
+}
+
+fn frames(old: &SubjectReport, new: &SubjectReport, notes: &mut Notes) {
     for a in &old.frames {
         let name = format!("{} {} {} {} {}", old.name, a.view, a.splat, a.size, a.budget);
-        let same = |b: &&super::frame::FrameRow| {
+        let same = |b: &&FrameRow| {
             (&b.view, &b.splat, &b.size, b.budget) == (&a.view, &a.splat, &a.size, a.budget)
         };
         let Some(b) = new.frames.iter().find(same) else {
-            missing.push(name);
+            notes.gone(name);
             continue;
         };
         match (a.error.ssim, b.error.ssim) {
-            (Some(x), Some(y)) => note(format!("{name} ssim"), x, y, y < x - SSIM_ALLOWANCE),
-            (Some(_), None) => missing.push(format!("{name} ssim")),
+            (Some(x), Some(y)) => notes.similar(format!("{name} ssim"), x, y),
+            (Some(_), None) => notes.gone(format!("{name} ssim")),
             (None, _) => {}
         }
         let spread = a.ms_spread.max(b.ms_spread) - 1.0;
-        let is_slower = is_one_machine && grown(a.ms, b.ms, spread + TIME_ALLOWANCE);
-        note(format!("{name} ms"), a.ms, b.ms, is_slower);
+        notes.machine(format!("{name} ms"), a.ms, b.ms, spread + TIME_ALLOWANCE);
     }
+}
+
+fn streams(old: &SubjectReport, new: &SubjectReport, notes: &mut Notes) {
     let (races, others) = (old.races(), new.races());
     for race in &races {
         let twin = others.iter().find(|other| {
@@ -95,34 +162,60 @@ fn subject(
             );
             let b = twin.and_then(|twin| twin.runs.iter().find(|b| b.run.policy == policy));
             let Some(b) = b else {
-                missing.push(name);
+                notes.gone(name);
                 continue;
             };
-            note(
-                format!("{name} ssim"),
-                a.run.ssim,
-                b.run.ssim,
-                b.run.ssim < a.run.ssim - SSIM_ALLOWANCE,
-            );
+            notes.similar(format!("{name} ssim"), a.run.ssim, b.run.ssim);
             // To the same end: that of the race hangs on the slowest rival.
             let end = |run: &StreamRun| run.samples.last().map_or(0.0, |sample| sample.ms);
             let horizon = end(a.run).max(end(b.run));
             let [x, y] = [a.run, b.run].map(|run| area(&run.samples, horizon));
-            note(format!("{name} area"), x, y, grown(x, y, GROWTH_ALLOWANCE));
-            let bytes = [a.run.bytes as f64, b.run.bytes as f64];
-            note(
-                format!("{name} bytes"),
-                bytes[0],
-                bytes[1],
-                grown(bytes[0], bytes[1], GROWTH_ALLOWANCE),
-            );
+            notes.small(format!("{name} area"), x, y);
+            notes.small(format!("{name} bytes"), a.run.bytes as f64, b.run.bytes as f64);
             match (a.run.settled_ms, b.run.settled_ms) {
-                (Some(x), Some(y)) => {
-                    note(format!("{name} settled_ms"), x, y, grown(x, y, GROWTH_ALLOWANCE));
-                }
-                (Some(_), None) => missing.push(format!("{name} settled_ms")),
+                (Some(x), Some(y)) => notes.small(format!("{name} settled_ms"), x, y),
+                (Some(_), None) => notes.gone(format!("{name} settled_ms")),
                 (None, _) => {}
             }
         }
     }
+}
+
+fn paths(old: &SubjectReport, new: &SubjectReport, notes: &mut Notes) {
+    for a in &old.paths {
+        let name = format!("{} {} by {} {}", old.name, a.path, a.link, a.policy.name());
+        let same = |b: &&PathRun| (&b.path, &b.link, b.policy) == (&a.path, &a.link, a.policy);
+        let Some(b) = new.paths.iter().find(same) else {
+            notes.gone(name);
+            continue;
+        };
+        notes.similar(format!("{name} mean_ssim"), a.mean_ssim, b.mean_ssim);
+        notes.similar(format!("{name} worst_ssim"), a.worst_ssim, b.worst_ssim);
+        if let (Some(x), Some(y)) = (a.popping_rms, b.popping_rms) {
+            notes.small(format!("{name} popping_rms"), x, y);
+        }
+        notes.small(format!("{name} bytes"), a.bytes as f64, b.bytes as f64);
+    }
+}
+
+/// A saving is worse where the view costs more with it; what it would cost without is beside the point.
+fn savings(old: &SubjectReport, new: &SubjectReport, notes: &mut Notes) {
+    for a in &old.left_out {
+        let name = format!("{} {} without {}", old.name, a.view, a.saving);
+        let same = |b: &&SavingRow| (&b.view, &b.saving) == (&a.view, &a.saving);
+        let Some(b) = new.left_out.iter().find(same) else {
+            notes.gone(name);
+            continue;
+        };
+        notes.small(format!("{name} bytes"), a.with.bytes as f64, b.with.bytes as f64);
+        notes.small(format!("{name} load_ms"), a.with.load_ms, b.with.load_ms);
+        notes.small(format!("{name} points"), a.with.points as f64, b.with.points as f64);
+    }
+    for attribute in &old.not_stored.constant_attributes {
+        if !new.not_stored.constant_attributes.contains(attribute) {
+            notes.gone(format!("{} without a column of {attribute}", old.name));
+        }
+    }
+    let [x, y] = [old, new].map(|subject| subject.not_stored.shader_bytes[0] as f64);
+    notes.small(format!("{} shader bytes", old.name), x, y);
 }

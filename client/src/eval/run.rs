@@ -2,6 +2,7 @@
 
 use std::{
     collections::HashMap,
+    io::Write,
     path::{Path, PathBuf},
     process::Command,
     sync::atomic::AtomicBool,
@@ -9,6 +10,7 @@ use std::{
 };
 
 use anyhow::Context;
+use lodestream_protocol::{BOOT_SPECULATIVE_BYTES, Header};
 use serde::Deserialize;
 use wait4::Wait4;
 
@@ -21,11 +23,12 @@ use super::{
 };
 use crate::{
     engine::{EngineConfig, Policy},
+    interrupt::go_on,
     metrics::{PictureError, ssim_map},
     path::{Extent, PathSource},
     render::{Picture, RenderSettings, Splat, SplatSize},
     report::machine,
-    source::LinkSpec,
+    source::{BlockingSource, LinkSpec, Source},
 };
 
 /// What truths are drawn with, and what streams in: closed surfaces, each splat as large as the points
@@ -37,6 +40,9 @@ const BACKGROUND: [u8; 3] = [18, 18, 24];
 
 /// A view from beside it, in picture heights: where a visitor jumps to.
 const JUMP_HEIGHTS: f64 = 0.75;
+
+/// A request's, of a dataset that is fetched whole.
+const FETCH_BYTES: u64 = 8 << 20;
 
 /// What is evaluated, and how.
 #[derive(Debug, Clone)]
@@ -95,7 +101,7 @@ pub fn run(
     // All of them first: a wrong one is told before the long work begins.
     let mut opened: Vec<(Subject, Option<BuildRow>)> = Vec::new();
     for input in &config.inputs {
-        for (path, build) in datasets(input, config, scratch.path(), opened.len(), say)? {
+        for (path, build) in datasets(input, config, scratch.path(), opened.len(), cancel, say)? {
             let mut subject = Subject::open(&path)?;
             if let Some(build) = build.as_ref().filter(|_| config.methods.len() > 1) {
                 subject.name = format!("{} {}", subject.name, build.method);
@@ -143,15 +149,26 @@ fn unique<'a>(name: &str, others: impl Iterator<Item = &'a str> + Clone) -> Stri
     free.unwrap_or_else(|| name.to_owned())
 }
 
-/// The dataset that `input` is, or those that are built from it, one for each method.
+/// The dataset that `input` is, wherever it lies, or those that are built from it, one for each method.
 fn datasets(
     input: &str,
     config: &EvalConfig,
     scratch: &Path,
     first: usize,
+    cancel: &AtomicBool,
     say: &dyn Fn(&str),
 ) -> anyhow::Result<Vec<(PathBuf, Option<BuildRow>)>> {
+    let folder = |index: usize| -> anyhow::Result<PathBuf> {
+        // Inputs of one name lie apart.
+        let folder = scratch.join(index.to_string());
+        std::fs::create_dir(&folder).context("cannot make a temporary folder")?;
+        Ok(folder)
+    };
     let path = Path::new(input);
+    if Source::names_url(input) {
+        say(&format!("{input}: fetch"));
+        return Ok(vec![(fetch(input, &folder(first)?, cancel)?, None)]);
+    }
     if path.extension().is_some_and(|ending| ending == "lods") {
         return Ok(vec![(path.to_owned(), None)]);
     }
@@ -160,15 +177,35 @@ fn datasets(
         None => path.file_stem().map_or("dataset".into(), |stem| stem.to_string_lossy()),
     };
     let build_one = |(index, method): (usize, &String)| {
-        // Inputs of one name lie apart.
-        let folder = scratch.join((first + index).to_string());
-        std::fs::create_dir(&folder).context("cannot make a temporary folder")?;
+        let folder = folder(first + index)?;
         say(&format!("{input}: build, {method}"));
         let output = folder.join(format!("{stem}.lods"));
         let row = build(input, method, &output, &folder.join("build.json"))?;
         Ok((output, Some(row)))
     };
     config.methods.iter().enumerate().map(build_one).collect()
+}
+
+/// Fetches a hosted dataset whole: truths take every point of it, many times over.
+fn fetch(address: &str, folder: &Path, cancel: &AtomicBool) -> anyhow::Result<PathBuf> {
+    let url = Source::parse_url(address)?;
+    let name = url.path_segments().and_then(|mut segments| segments.next_back());
+    let name = name.filter(|name| !name.is_empty()).unwrap_or("dataset.lods");
+    let path = folder.join(name);
+    let source = BlockingSource::new(Source::parse(address)?)?;
+    // The size that the dataset says itself: hosts need not tell.
+    let header = source.read_prefix(BOOT_SPECULATIVE_BYTES)?;
+    let bytes = Header::parse(&header.bytes).with_context(|| address.to_owned())?.file_bytes;
+    let unwritten = || format!("{}: cannot write", path.display());
+    let mut file = std::fs::File::create(&path).with_context(unwritten)?;
+    let mut offset = 0;
+    while offset < bytes {
+        go_on(cancel)?;
+        let piece = source.read_range(offset, FETCH_BYTES.min(bytes - offset))?;
+        file.write_all(&piece).with_context(unwritten)?;
+        offset += piece.len() as u64;
+    }
+    Ok(path)
 }
 
 /// Builds by the program itself, in a process of its own: whose memory is the build's.

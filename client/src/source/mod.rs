@@ -118,6 +118,13 @@ impl Source {
         })
     }
 
+    /// Whether a user means an address, and not a file: then [`parse_url`](Self::parse_url) takes it, or
+    /// says what is wrong with it.
+    #[must_use]
+    pub fn names_url(text: &str) -> bool {
+        text.contains("://") || locator::url(text).is_ok_and(|url| url.is_some())
+    }
+
     /// The file behind a made-up link, for measuring what links do.
     #[must_use]
     pub const fn linked(file: FileSource, link: Arc<Link>) -> Self {

@@ -25,8 +25,8 @@ pub struct Cloud {
     pub status: CloudStatus,
     /// What coordinates mean.
     pub crs: Crs,
-    /// Whether the opening was told.
-    pub is_told: bool,
+    /// The version whose opening was told, counted from 0.
+    pub told_version: Option<u32>,
 }
 
 impl Cloud {

@@ -406,7 +406,7 @@ impl Viewer {
     /// Takes the engine's news: how the clouds are, the newest plan.
     pub fn take_news(&mut self) {
         let statuses = self.engine.clouds();
-        let mut told = Vec::new();
+        let (mut told, mut replaced) = (Vec::new(), Vec::new());
         for (number, (cloud, status)) in self.clouds.iter_mut().zip(statuses).enumerate() {
             let trouble = status.failure.clone().or_else(|| status.trouble.clone());
             let before = cloud.status.failure.clone().or_else(|| cloud.status.trouble.clone());
@@ -417,17 +417,22 @@ impl Viewer {
             if trouble != before {
                 told.push(("cloud", json!({ "cloud": number, "trouble": trouble })));
             }
-            if !cloud.is_told
+            let version = Some(cloud.status.replaced);
+            if cloud.told_version != version
                 && let Some(manifest) = cloud.manifest()
             {
                 let (source, points) = (&cloud.source, manifest.points);
                 told.push((
                     "opened",
-                    json!({ "cloud": number, "source": source, "points": points }),
+                    json!({ "cloud": number, "source": source, "points": points, "version": version }),
                 ));
-                cloud.is_told = true;
+                if cloud.told_version.is_some() {
+                    replaced.push(format!("{} has changed; this is the new one", cloud.name()));
+                }
+                cloud.told_version = version;
             }
         }
+        replaced.into_iter().for_each(|text| self.note(text));
         told.into_iter().for_each(|(name, what)| self.events.tell(name, what));
         self.stats = self.engine.stats();
         if let Some((min, max)) = self.extent() {

@@ -208,6 +208,16 @@ impl<'a> Window<'a> {
         })
     }
 
+    /// Waits for an event; from it on counts what is told.
+    pub fn wait_from(&mut self, name: &str, is_it: impl Fn(&Value) -> bool) {
+        let now = self.now;
+        self.now = self.wait_for(name, |told| {
+            let mut news = told.events.iter().enumerate().skip(now);
+            let found = news.find(|(_, event)| event["event"] == name && is_it(event));
+            found.map(|(index, _)| index)
+        });
+    }
+
     /// Waits until the picture of what hands did is complete.
     pub fn settled(&mut self) -> Value {
         self.wait("settled", |_| true)

@@ -22,7 +22,7 @@ const SAME: f64 = 0.98;
 const BUDGET: &str = "400000";
 
 /// The splats of the pictures that are compared.
-const LOOK: [&str; 8] =
+pub const LOOK: [&str; 8] =
     ["--splat", "circle", "--splat-size", "adaptive:1.6", "--min-splat", "2", "--max-splat", "8"];
 
 pub fn eye(event: &Value) -> [f64; 3] {
@@ -44,7 +44,7 @@ fn middle(event: &Value) -> [i64; 2] {
 }
 
 /// Draws what the window shows by `lodestream shot`, from the camera that was written beside its picture.
-fn compare(world: &World, picture: &Path, arguments: &[&str]) {
+pub fn compare(world: &World, picture: &Path, arguments: &[&str]) {
     let shown = read(picture);
     let size = format!("{}x{}", shown.width, shown.height);
     let camera = picture.with_extension("camera.json").display().to_string();
@@ -61,10 +61,15 @@ fn compare(world: &World, picture: &Path, arguments: &[&str]) {
         "--camera",
         &camera,
     ]);
-    run(command.args(arguments));
+    let report = world.file("drawn.json");
+    run(command.args(arguments).args(["--report", &report]));
     let similarity = ssim(&shown, &read(&drawn)).expect("the same size");
     let [picture, drawn] = [picture, &drawn].map(|path| path.display().to_string());
-    assert!(similarity > SAME, "SSIM {similarity}: {picture} against {drawn} {arguments:?}");
+    let report = std::fs::read_to_string(report).expect("a report");
+    assert!(
+        similarity > SAME,
+        "SSIM {similarity}: {picture} against {drawn} {arguments:?}, {report}"
+    );
 }
 
 /// Where screenshots go: for the documentation, or beside the build.

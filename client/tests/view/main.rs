@@ -7,6 +7,7 @@ mod screen;
 mod world;
 
 mod bad_cases;
+mod clouds;
 mod explore;
 mod paths;
 

@@ -1,8 +1,8 @@
 //! What pictures look like.
 
-use egui::{ComboBox, DragValue, Slider, Ui};
+use egui::{ComboBox, DragValue, Ui};
 
-use super::field;
+use super::{field, slider};
 use crate::{
     render::{ColorMode, EyeDome, LARGEST_SPLAT_PX, SMALLEST_SPLAT_PX, Splat, SplatSize},
     viewer::{state::Viewer, theme::Palette},
@@ -54,18 +54,24 @@ pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
     match &mut look.splat_size {
         SplatSize::Pixels(px) => {
             field(ui, palette, "", |ui| {
-                ui.add(Slider::new(px, 1.0..=32.0).logarithmic(true).suffix(" px"))
+                ui.add(slider(px, 1.0..=32.0).logarithmic(true).suffix(" px"))
             });
         }
         SplatSize::World(size) => {
             let speed = (0.01 * *size).max(1e-9);
             field(ui, palette, "", |ui| {
-                ui.add(DragValue::new(size).speed(speed).range(1e-9..=1e9).suffix(" units"))
+                ui.add(
+                    DragValue::new(size)
+                        .speed(speed)
+                        .range(1e-9..=1e9)
+                        .clamp_existing_to_range(false)
+                        .suffix(" units"),
+                )
             });
         }
         SplatSize::Level(times) | SplatSize::Adaptive(times) => {
             field(ui, palette, "", |ui| {
-                ui.add(Slider::new(times, 0.2..=8.0).logarithmic(true).suffix(" x"))
+                ui.add(slider(times, 0.2..=8.0).logarithmic(true).suffix(" x"))
             });
         }
         SplatSize::Own => {}
@@ -90,10 +96,10 @@ pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
         ui.checkbox(&mut look.eye_dome, "eye-dome").on_hover_text("By steps of depth (L)");
     });
     if look.eye_dome {
-        field(ui, palette, "Strength", |ui| ui.add(Slider::new(&mut look.edl_strength, 0.0..=2.0)));
+        field(ui, palette, "Strength", |ui| ui.add(slider(&mut look.edl_strength, 0.0..=2.0)));
         field(ui, palette, "Radius", |ui| {
             let largest = EyeDome::LARGEST_RADIUS_PX;
-            let radius = Slider::new(&mut look.edl_radius_px, 1.0..=largest).logarithmic(true);
+            let radius = slider(&mut look.edl_radius_px, 1.0..=largest).logarithmic(true);
             ui.add(radius.suffix(" px"))
         });
     }

@@ -2,7 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use egui::{Align, Button, ComboBox, Layout, RichText, ScrollArea, Ui};
+use egui::{
+    Align, Button, ComboBox, Layout, PopupCloseBehavior, RichText, Role, ScrollArea, Ui,
+    WidgetInfo,
+    containers::menu::{MenuButton, MenuConfig},
+};
 
 use crate::{
     render::ColorMode,
@@ -63,11 +67,15 @@ fn show_cloud(number: usize, cloud: &Cloud, ui: &mut Ui, palette: Palette) -> Op
     let mut wish = None;
     ui.horizontal(|ui| {
         let mut is_visible = cloud.is_visible;
-        if ui.checkbox(&mut is_visible, "").on_hover_text("Shown or not").changed() {
+        let shown = ui.checkbox(&mut is_visible, "").on_hover_text("Shown or not");
+        // What stands beside it for eyes, for assistive technology.
+        let title = || format!("Show {}", cloud.name());
+        shown.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, cloud.is_visible, title()));
+        if shown.changed() {
             wish = Some(Wish::Visible(is_visible));
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.menu_button("…", |ui| {
+            let more = ui.menu_button("…", |ui| {
                 if ui.button("Show all of it").clicked() {
                     wish = Some(Wish::Frame);
                 }
@@ -78,6 +86,7 @@ fn show_cloud(number: usize, cloud: &Cloud, ui: &mut Ui, palette: Palette) -> Op
                     wish = Some(Wish::Close);
                 }
             });
+            more.response.widget_info(|| labeled(Role::Button, "More of", cloud));
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                 let name =
                     Button::new(RichText::new(cloud.name()).strong()).frame(false).truncate();
@@ -109,9 +118,10 @@ fn show_cloud(number: usize, cloud: &Cloud, ui: &mut Ui, palette: Palette) -> Op
     let Some(manifest) = cloud.manifest() else { return wish };
     ui.horizontal(|ui| {
         let title = cloud.color.map_or("as in Look", ColorMode::name);
-        ComboBox::from_id_salt(("color", number)).selected_text(title).width(130.0).show_ui(
-            ui,
-            |ui| {
+        let colors = ComboBox::from_id_salt(("color", number))
+            .selected_text(title)
+            .width(130.0)
+            .show_ui(ui, |ui| {
                 if ui.selectable_label(cloud.color.is_none(), "as in Look").clicked() {
                     wish = Some(Wish::Color(None));
                 }
@@ -120,13 +130,17 @@ fn show_cloud(number: usize, cloud: &Cloud, ui: &mut Ui, palette: Palette) -> Op
                         wish = Some(Wish::Color(Some(mode)));
                     }
                 }
-            },
-        );
+            });
+        colors.response.widget_info(|| labeled(Role::ComboBox, "Colour of", cloud));
         if let Some(range) = class_range(manifest) {
             let hidden = cloud.hidden_classes.len();
             let title =
                 if hidden == 0 { "Classes".into() } else { format!("Classes, {hidden} off") };
-            ui.menu_button(title, |ui| {
+            // Several classes are switched in one go.
+            let stays = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+            let (button, _) = MenuButton::new(title).config(stays).ui(ui, |ui| {
+                // Beside the names, not over them.
+                ui.spacing_mut().scroll.floating_allocated_width = 10.0;
                 ScrollArea::vertical().max_height(320.0).show(ui, |ui| {
                     let mut classes = cloud.hidden_classes.clone();
                     for class in range {
@@ -145,10 +159,16 @@ fn show_cloud(number: usize, cloud: &Cloud, ui: &mut Ui, palette: Palette) -> Op
                     }
                 });
             });
+            button.widget_info(|| labeled(Role::Button, "Classes of", cloud));
         }
     });
     ui.add_space(4.0);
     wish
+}
+
+/// What stands beside a widget for eyes, for assistive technology.
+fn labeled(role: Role, what: &str, cloud: &Cloud) -> WidgetInfo {
+    WidgetInfo::labeled(role, true, format!("{what} {}", cloud.name()))
 }
 
 /// Classes that a cloud may have.

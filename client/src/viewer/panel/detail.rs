@@ -1,8 +1,8 @@
 //! How much is drawn, and kept.
 
-use egui::{Slider, Ui};
+use egui::Ui;
 
-use super::field;
+use super::{field, slider};
 use crate::viewer::{Settings, numbers, state::Viewer, theme::Palette};
 
 /// Most points of the slider; the command line may ask for more.
@@ -13,19 +13,19 @@ pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let settings = &mut viewer.settings;
     field(ui, palette, "Points", |ui| {
         let most = MOST_POINTS.max(settings.point_budget);
-        let slider = Slider::new(&mut settings.point_budget, *Settings::BUDGETS.start()..=most)
+        let slider = slider(&mut settings.point_budget, *Settings::BUDGETS.start()..=most)
             .logarithmic(true)
             .custom_formatter(|points, _| numbers::short(points as u64))
             .custom_parser(points);
         ui.add(slider).on_hover_text("Most points drawn at once, over all clouds")
     });
     field(ui, palette, "Least node", |ui| {
-        let slider = Slider::new(&mut settings.min_node_px, 4.0..=400.0).logarithmic(true);
+        let slider = slider(&mut settings.min_node_px, Settings::MIN_NODE_PX).logarithmic(true);
         let slider = slider.suffix(" px").max_decimals(0);
         ui.add(slider).on_hover_text("Parts that appear smaller are left out")
     });
     field(ui, palette, "Cache", |ui| {
-        let slider = Slider::new(&mut settings.cache_mib, 0..=8192).logarithmic(true);
+        let slider = slider(&mut settings.cache_mib, 0..=8192).logarithmic(true);
         ui.add(slider.suffix(" MiB")).on_hover_text("What is kept though it is not drawn")
     });
 }

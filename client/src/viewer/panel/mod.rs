@@ -9,7 +9,12 @@ mod session;
 mod statistics;
 mod views;
 
-use egui::{Align, CollapsingHeader, Frame, Layout, Margin, Panel, RichText, ScrollArea, Ui};
+use std::ops::RangeInclusive;
+
+use egui::{
+    Align, CollapsingHeader, Frame, Layout, Margin, Panel, RichText, ScrollArea, Slider,
+    SliderClamping, Ui,
+};
 
 use super::{
     actions::{Action, GESTURES, SHORTCUTS},
@@ -65,8 +70,9 @@ fn top_bar(viewer: &mut Viewer, ui: &mut Ui) {
             button(ui, "Picture", "Write the picture as PNG (F12)", Action::Picture);
             ui.separator();
             button(ui, "Fit", "Show all (F)", Action::Fit);
+            // What does not fit is left to its keys.
             let room = ui.available_width();
-            if room > 560.0 {
+            if room > 780.0 {
                 for (index, (side, name)) in Side::ALL.into_iter().enumerate() {
                     let tip = format!("View {} ({})", name.to_lowercase(), index + 1);
                     button(ui, name, &tip, Action::Look(side));
@@ -93,7 +99,8 @@ fn top_bar(viewer: &mut Viewer, ui: &mut Ui) {
                     Action::Measure,
                 ),
             ];
-            for (is_on, label, tip, does) in toggles {
+            let fitting = if room > 400.0 { toggles.len() } else { 0 };
+            for (is_on, label, tip, does) in toggles.into_iter().take(fitting) {
                 if ui.add(egui::Button::selectable(is_on, label)).on_hover_text(tip).clicked() {
                     action = Some(does);
                 }
@@ -193,6 +200,14 @@ fn side_panel(viewer: &mut Viewer, ui: &mut Ui) {
             ui.add_space(8.0);
         });
     });
+}
+
+/// A slider that leaves what the command line or a session says as it is, be it beyond its ends.
+fn slider<'a, Number: egui::emath::Numeric>(
+    value: &'a mut Number,
+    range: RangeInclusive<Number>,
+) -> Slider<'a> {
+    Slider::new(value, range).clamping(SliderClamping::Edits)
 }
 
 fn section(ui: &mut Ui, title: &str, is_open: bool, contents: impl FnOnce(&mut Ui)) {
