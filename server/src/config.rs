@@ -117,7 +117,7 @@ impl ServeConfig {
             tls: None,
             trusted_proxies: Vec::new(),
             access_log: false,
-            max_connections: 4096,
+            max_connections: 8192,
             max_body_bytes: 1 << 20,
             rate: None,
             head_timeout: Duration::from_secs(60),

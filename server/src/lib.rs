@@ -46,6 +46,7 @@ mod running;
 mod server;
 mod storage;
 mod tls;
+mod workers;
 
 pub use config::{DataPlace, ObjectPlace, RateLimit, ServeConfig, TlsFiles};
 pub use error::{Error, Result};

@@ -1,12 +1,18 @@
 //! The server: a bound socket, then a loop that accepts connections until it is asked to stop.
 //!
 //! The loop is axum's own, but for what that one does not offer: a limit on connections, timeouts
-//! on slow clients, TLS whose certificate can be changed, and an end to draining.
+//! on slow clients, TLS whose certificate can be changed, an end to draining, and [a thread](crate::workers)
+//! for each connection to stay on.
 
-use std::{future::Future, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
+use std::{future::Future, io, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
 
 use hyper_util::server::graceful::GracefulShutdown;
-use tokio::{net::TcpListener, sync::watch, task::JoinSet, time::MissedTickBehavior};
+use tokio::{
+    net::{TcpListener, TcpStream},
+    sync::watch,
+    task::JoinSet,
+    time::MissedTickBehavior,
+};
 
 use crate::{
     access::Access,
@@ -15,6 +21,7 @@ use crate::{
     error::{Error, Result},
     routes::{self, Site},
     tls::Tls,
+    workers::Workers,
 };
 
 /// How often certificate and key are looked at.
@@ -26,6 +33,7 @@ pub struct Server {
     listener: TcpListener,
     addr: SocketAddr,
     host: Arc<Host>,
+    workers: Workers,
     config: ServeConfig,
 }
 
@@ -60,7 +68,7 @@ impl Server {
     /// Checks the configuration and binds the address. Needs a tokio runtime with I/O and time.
     ///
     /// # Errors
-    /// [`Error::Exposed`], [`Error::Folder`], [`Error::Tls`] or [`Error::Listen`].
+    /// [`Error::Exposed`], [`Error::Folder`], [`Error::Tls`], [`Error::Listen`] or [`Error::Thread`].
     pub async fn bind(config: ServeConfig) -> Result<Self> {
         config.check()?;
         let site = Site::open(&config)?;
@@ -70,7 +78,9 @@ impl Server {
         let addr = listener.local_addr().map_err(failed)?;
         let router = routes::router(Arc::clone(&site), &config);
         let limits = ConnectionLimits::from(&config);
-        Ok(Self { listener, addr, host: Arc::new(Host { site, router, tls, limits }), config })
+        let host = Arc::new(Host { site, router, tls, limits });
+        let workers = Workers::start().map_err(Error::Thread)?;
+        Ok(Self { listener, addr, host, workers, config })
     }
 
     /// The address it listens on, with the port that was taken for port 0.
@@ -115,13 +125,23 @@ impl Server {
                 accepted = self.listener.accept(),
                     if connections.len() < self.config.max_connections =>
                 {
-                    match accepted {
+                    // From this thread's poller to that of the worker.
+                    match accepted.and_then(|(stream, address)| Ok((stream.into_std()?, address))) {
                         Ok((stream, address)) => {
                             let (host, watcher) = (Arc::clone(&self.host), graceful.watcher());
                             let stopping = stopping.clone();
-                            connections.spawn(connection::serve(
-                                stream, address, host, watcher, stopping,
-                            ));
+                            let (worker, seat) = self.workers.least_busy();
+                            let serving = async move {
+                                let _seat = seat;
+                                match TcpStream::from_std(stream) {
+                                    Ok(stream) => {
+                                        connection::serve(stream, address, host, watcher, stopping)
+                                            .await;
+                                    }
+                                    Err(e) => tracing::warn!("cannot serve {address}: {e}"),
+                                }
+                            };
+                            connections.spawn_on(serving, worker);
                         }
                         Err(e) => recover(&e).await,
                     }
@@ -154,8 +174,8 @@ impl Server {
 
 /// A failed accept concerns one connection, or the system is out of files: then a pause lets
 /// others end.
-async fn recover(error: &std::io::Error) {
-    use std::io::ErrorKind;
+async fn recover(error: &io::Error) {
+    use io::ErrorKind;
     let is_of_the_peer = matches!(
         error.kind(),
         ErrorKind::ConnectionAborted | ErrorKind::ConnectionReset | ErrorKind::ConnectionRefused

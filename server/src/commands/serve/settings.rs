@@ -149,7 +149,7 @@ impl Default for Settings {
 impl Default for LimitSettings {
     fn default() -> Self {
         Self {
-            max_connections: 4096,
+            max_connections: 8192,
             max_body: "1MiB".into(),
             requests_per_second: 0.0,
             burst: 200,
