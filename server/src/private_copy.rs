@@ -171,12 +171,6 @@ impl PrivateCopy {
         is_there(range.start) && is_there(range.end - 1)
     }
 
-    /// Sends a response's head, which waits for what follows so that they share a packet.
-    pub(crate) fn send_head(&self, stream: &TcpStream, head: &[u8]) -> io::Result<usize> {
-        use rustix::net::{SendFlags, send};
-        Ok(send(stream, head, SendFlags::MORE | SendFlags::NOSIGNAL)?)
-    }
-
     /// Sends some of the range.
     pub(crate) fn send_pages(&self, stream: &TcpStream, range: &Range<u64>) -> io::Result<usize> {
         let mut offset = range.start;
@@ -190,10 +184,6 @@ impl PrivateCopy {
 impl PrivateCopy {
     pub(crate) fn is_cached(&self, _: &Range<u64>) -> bool {
         false
-    }
-
-    pub(crate) fn send_head(&self, _: &TcpStream, _: &[u8]) -> io::Result<usize> {
-        Err(io::ErrorKind::Unsupported.into())
     }
 
     pub(crate) fn send_pages(&self, _: &TcpStream, _: &Range<u64>) -> io::Result<usize> {

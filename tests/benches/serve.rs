@@ -273,13 +273,14 @@ fn ticks(pids: &[u32]) -> u64 {
 }
 
 fn range_script(size: u64) -> String {
-    let last_page = (FILE_BYTES - size) / 4096;
+    // Anywhere: payloads do not begin with pages.
+    let last = FILE_BYTES - size;
     format!(
         "local requests, next = {{}}, 0\n\
          function init(args)\n\
            math.randomseed(1)\n\
            for i = 1, {REQUESTS} do\n\
-             local first = math.random(0, {last_page}) * 4096\n\
+             local first = math.random(0, {last})\n\
              local range = string.format('bytes=%d-%d', first, first + {size} - 1)\n\
              requests[i] = wrk.format('GET', nil, {{ ['Range'] = range }})\n\
            end\n\
@@ -292,7 +293,7 @@ fn range_script(size: u64) -> String {
 fn places() -> impl Iterator<Item = u64> {
     let next = |state: &u64| Some(state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1));
     let states = std::iter::successors(Some(1u64), next).skip(1);
-    states.map(|state| (state >> 33) % ((FILE_BYTES - u64::from(NODE_BYTES)) / 4096) * 4096)
+    states.map(|state| (state >> 33) % (FILE_BYTES - u64::from(NODE_BYTES)))
 }
 
 fn node_requests() -> Vec<Vec<u8>> {

@@ -19,8 +19,9 @@ use crate::{
     routes::{Site, batch_segments},
 };
 
-/// From this length on, sending pages is less work than copying bytes.
-const SENDFILE_BYTES: u64 = 32 << 10;
+/// From this length on, sending pages is no slower than copying bytes, and less of the server's work. (Requests a second at one
+/// unaligned place over 16 connections, pages and copies: 45 and 55 thousand of 64 KiB, 33 and 29 of 128 KiB.)
+const SENDFILE_BYTES: u64 = 128 << 10;
 
 /// Sends head and content.
 pub(super) async fn send(
@@ -86,9 +87,10 @@ impl Socket<'_> {
         mut head: &[u8],
         mut range: Range<u64>,
     ) -> io::Result<()> {
+        // In a packet of its own. Made to wait for the first pages, it takes a fifth of the speed away: they no longer
+        // fill packets that begin with them.
         while !head.is_empty() {
-            let send = || copy.send_head(self.stream, head);
-            head = &head[self.wait(self.stream.try_io(Interest::WRITABLE, send)).await?..];
+            head = &head[self.wait(self.stream.try_write(head)).await?..];
         }
         while !range.is_empty() {
             let send = || copy.send_pages(self.stream, &range);
