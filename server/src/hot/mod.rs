@@ -7,9 +7,8 @@
 //! pages themselves (`sendfile`), from a [private copy](crate::private_copy).
 //!
 //! The server's processor time for each request, µs, beside nginx 1.22 (`sendfile`, no access log), on two
-//! shared cores, 16 connections, two rounds of the load of `./dev bench serve`: 10.6 (nginx 15) for 4 KiB, 17.7 (22.4) for 64
-//! KiB, 35 (60) for 256 KiB, 107-157 (134) for 1 MiB. The long way with copied bytes took 13.5, 20 and,
-//! for 1 MiB, 230 when nginx took 13, 18 and 60.
+//! cores, 16 connections, ranges at any byte, by `./dev bench serve`: 12.8 (nginx 14.5) for 4 KiB, 23.6 (21.0) for
+//! 64 KiB, 44 (48.5) for 256 KiB, 224 (216) for 1 MiB. The long way took 13.5 for 4 KiB when this took 10.6.
 
 mod answer;
 mod head;
