@@ -132,7 +132,7 @@ fn compares(folder: &Path, report: &Report) {
     assert!(said.starts_with("0 worse or gone, 0 different"), "{said}");
 
     type Worse<'a> = (&'a str, &'a dyn Fn(&mut Report));
-    let worse: [Worse; 14] = [
+    let worse: [Worse; 18] = [
         ("near point 1px 5000 ssim", &|r| {
             r.subjects[0].frames[0].error.ssim =
                 r.subjects[0].frames[0].error.ssim.map(|s| s - 0.01);
@@ -146,6 +146,13 @@ fn compares(folder: &Path, report: &Report) {
         ("build seconds", &|r| build(r).seconds *= 10.0),
         ("build by poisson", &|r| r.subjects[0].build = None),
         ("orbit by 20mbit/40ms ours mean_ssim", &|r| r.subjects[0].paths[0].mean_ssim -= 0.01),
+        ("ours worst_ssim", &|r| r.subjects[0].paths[0].worst_ssim -= 0.01),
+        ("ours popping_rms", &|r| {
+            r.subjects[0].paths[0].popping_rms =
+                r.subjects[0].paths[0].popping_rms.map(|p| 2.0 * p);
+        }),
+        ("load_ms", &|r| saving(r).with.load_ms *= 2.0),
+        ("build peak_bytes", &|r| build(r).peak_bytes = build(r).peak_bytes.map(|b| 2 * b)),
         ("orbit by 20mbit/40ms potree", &|r| {
             r.subjects[0].paths.retain(|run| run.policy != Policy::Potree);
         }),

@@ -3,8 +3,8 @@
 //! Answering a request takes some ten microseconds. On one runtime for all threads, its one poller hands what is
 //! ready from thread to thread, which costs more than it evens out, and where the system takes the processor from
 //! the thread that polls, all connections wait. Here a thread polls for its own connections alone, as nginx's
-//! processes do. Nothing is to run long on these threads: reads that may wait and work of the processor go
-//! to the blocking pool.
+//! processes do. Nothing may wait on these threads: reads that would are for the blocking pool, as are the short calls of the
+//! file system once several [were slow](crate::offload).
 
 use std::{io, num::NonZero, sync::Arc, thread};
 

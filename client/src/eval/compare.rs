@@ -42,25 +42,30 @@ pub struct Difference {
 /// of one size with the same samples.
 #[must_use]
 pub fn compare(before: &Report, after: &Report) -> (Vec<Difference>, Vec<String>) {
-    let (mut differences, mut missing) = (Vec::new(), Vec::new());
     let is_one_machine = before.machine == after.machine;
+    let mut notes = Notes { differences: Vec::new(), missing: Vec::new(), is_one_machine };
     for old in &before.subjects {
-        match after.subjects.iter().find(|new| new.name == old.name) {
-            Some(new) => subject(old, new, is_one_machine, &mut differences, &mut missing),
-            None => missing.push(old.name.clone()),
-        }
+        let Some(new) = after.subjects.iter().find(|new| new.name == old.name) else {
+            notes.gone(old.name.clone());
+            continue;
+        };
+        builds(old, new, &mut notes);
+        frames(old, new, &mut notes);
+        streams(old, new, &mut notes);
+        paths(old, new, &mut notes);
+        savings(old, new, &mut notes);
     }
-    (differences, missing)
+    (notes.differences, notes.missing)
 }
 
-/// What is noted of a dataset's twins.
-struct Notes<'a> {
-    differences: &'a mut Vec<Difference>,
-    missing: &'a mut Vec<String>,
+/// What is found.
+struct Notes {
+    differences: Vec<Difference>,
+    missing: Vec<String>,
     is_one_machine: bool,
 }
 
-impl Notes<'_> {
+impl Notes {
     fn note(&mut self, what: String, before: f64, after: f64, is_regression: bool) {
         if before != after {
             self.differences.push(Difference { what, before, after, is_regression });
@@ -90,21 +95,6 @@ impl Notes<'_> {
 
 fn grown(before: f64, after: f64, allowance: f64) -> bool {
     after > before * (1.0 + allowance)
-}
-
-fn subject(
-    old: &SubjectReport,
-    new: &SubjectReport,
-    is_one_machine: bool,
-    differences: &mut Vec<Difference>,
-    missing: &mut Vec<String>,
-) {
-    let notes = &mut Notes { differences, missing, is_one_machine };
-    builds(old, new, notes);
-    frames(old, new, notes);
-    streams(old, new, notes);
-    paths(old, new, notes);
-    savings(old, new, notes);
 }
 
 fn builds(old: &SubjectReport, new: &SubjectReport, notes: &mut Notes) {

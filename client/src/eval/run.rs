@@ -194,18 +194,20 @@ fn fetch(address: &str, folder: &Path, cancel: &AtomicBool) -> anyhow::Result<Pa
     let path = folder.join(name);
     let source = BlockingSource::new(Source::parse(address)?)?;
     // The size that the dataset says itself: hosts need not tell.
-    let header = source.read_prefix(BOOT_SPECULATIVE_BYTES)?;
-    let bytes = Header::parse(&header.bytes).with_context(|| address.to_owned())?.file_bytes;
+    let mut piece = source.read_prefix(BOOT_SPECULATIVE_BYTES)?.bytes;
+    let bytes = Header::parse(&piece).with_context(|| address.to_owned())?.file_bytes;
     let unwritten = || format!("{}: cannot write", path.display());
     let mut file = std::fs::File::create(&path).with_context(unwritten)?;
     let mut offset = 0;
-    while offset < bytes {
-        go_on(cancel)?;
-        let piece = source.read_range(offset, FETCH_BYTES.min(bytes - offset))?;
+    loop {
         file.write_all(&piece).with_context(unwritten)?;
         offset += piece.len() as u64;
+        if offset >= bytes {
+            return Ok(path);
+        }
+        go_on(cancel)?;
+        piece = source.read_range(offset, FETCH_BYTES.min(bytes - offset))?;
     }
-    Ok(path)
 }
 
 /// Builds by the program itself, in a process of its own: whose memory is the build's.

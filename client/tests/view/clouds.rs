@@ -61,11 +61,24 @@ fn each_cloud_has_classes_colours_and_visibility_of_its_own() {
     window.wait("settled", |event| points(event) == 25_000);
     window.keys(&["Escape"]);
 
+    // The second alone, as the look says.
+    let alone = |window: &mut Window| {
+        window.press("CheckBox", "Show courtyard");
+        window.wait("settled", |event| points(event) == 5_000);
+        let picture = read(&window.picture());
+        window.press("CheckBox", "Show courtyard");
+        window.wait("settled", |event| points(event) == 25_000);
+        picture
+    };
+    let second_before = alone(&mut window);
+
     // Colours: the picture is another, and with the same colour for all of them another again.
     let by_colour = window.picture();
     window.choose("Colour of courtyard", "elevation");
     window.settled();
     let of_one = window.picture();
+    let similarity = ssim(&second_before, &alone(&mut window)).expect("the same size");
+    assert!(similarity > 0.999, "the second has kept its colours: SSIM {similarity}");
     window.choose("Colour of second", "elevation");
     window.settled();
     let of_both = window.picture();

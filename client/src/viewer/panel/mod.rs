@@ -78,7 +78,6 @@ fn top_bar(viewer: &mut Viewer, ui: &mut Ui) {
                     button(ui, name, &tip, Action::Look(side));
                 }
             }
-            ui.separator();
             let toggles = [
                 (
                     viewer.navigator.goal().orthographic,
@@ -99,10 +98,12 @@ fn top_bar(viewer: &mut Viewer, ui: &mut Ui) {
                     Action::Measure,
                 ),
             ];
-            let fitting = if room > 400.0 { toggles.len() } else { 0 };
-            for (is_on, label, tip, does) in toggles.into_iter().take(fitting) {
-                if ui.add(egui::Button::selectable(is_on, label)).on_hover_text(tip).clicked() {
-                    action = Some(does);
+            if room > 400.0 {
+                ui.separator();
+                for (is_on, label, tip, does) in toggles {
+                    if ui.add(egui::Button::selectable(is_on, label)).on_hover_text(tip).clicked() {
+                        action = Some(does);
+                    }
                 }
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
