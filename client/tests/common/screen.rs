@@ -256,9 +256,10 @@ impl<'a> Window<'a> {
         self.widget(role, label);
     }
 
-    /// Whether a widget is there at the moment.
-    pub fn has_widget(&self, role: &str, label: &str) -> bool {
-        self.widget_now(role, label).is_some()
+    /// Waits until a widget is gone: widgets are told a moment after the picture that lacks them.
+    pub fn miss(&self, role: &str, label: &str) {
+        let is_gone = |told: &Told| told.middle_of(role, label).is_none().then_some(());
+        self.wait_for(&format!("the end of {role} {label:?}"), is_gone);
     }
 
     /// Clicks a widget.
