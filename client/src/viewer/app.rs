@@ -218,6 +218,7 @@ impl App {
                 viewer.show_drop_hint(&context);
             }
         });
+        self.viewer.events.tell_clicks(&output.platform_output.events);
         if let Some(update) = &output.platform_output.accesskit_update {
             self.viewer.events.tell_widgets(update, output.pixels_per_point);
         }

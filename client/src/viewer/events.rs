@@ -40,6 +40,16 @@ impl Events {
         let _ = writeln!(out, "{what}").and_then(|()| out.flush());
     }
 
+    /// Tells which widgets were clicked: role and label. A script learns so that it has hit what it aimed at.
+    pub fn tell_clicks(&self, output: &[egui::output::OutputEvent]) {
+        for event in output {
+            if let egui::output::OutputEvent::Clicked(info) = event {
+                let label = info.label.as_ref().or(info.current_text_value.as_ref());
+                self.tell("clicked", json!({ "role": format!("{:?}", info.role), "label": label }));
+            }
+        }
+    }
+
     /// Tells where widgets are, where that has changed: role, label, and the rectangle in pixels of the
     /// window.
     pub fn tell_widgets(&mut self, update: &egui::accesskit::TreeUpdate, pixels_per_point: f32) {

@@ -203,7 +203,7 @@ impl Viewer {
             let camera = self.camera;
             self.jobs.start(move || {
                 let outcome = write_with_camera(&picture, &camera, &file);
-                Answer::Picture { file, exported: false, outcome }
+                Answer::Picture { file, exported: false, is_complete: is_settled, outcome }
             });
         }
         let Some(export) = &mut self.export else { return Ok(()) };
@@ -217,7 +217,7 @@ impl Viewer {
                 self.is_writing = true;
                 self.jobs.start(move || {
                     let outcome = picture.write_png(&file).map_err(|e| e.to_string());
-                    Answer::Picture { file, exported: true, outcome }
+                    Answer::Picture { file, exported: true, is_complete: true, outcome }
                 });
             }
         } else {

@@ -38,6 +38,8 @@ pub enum Answer {
         file: PathBuf,
         /// Whether it is one of an export.
         exported: bool,
+        /// Whether it shows all that its view will show.
+        is_complete: bool,
         /// Why it is not there, if so.
         outcome: Result<(), String>,
     },

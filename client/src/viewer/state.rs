@@ -457,14 +457,17 @@ impl Viewer {
                     self.open_dialog.end_list(server, index);
                 }
                 Answer::Values { pick, point, known } => self.know(pick, &point, known),
-                Answer::Picture { file, exported, outcome } => {
-                    self.events
-                        .tell("picture", json!({ "file": file, "error": outcome.as_ref().err() }));
+                Answer::Picture { file, exported, is_complete, outcome } => {
+                    let error = outcome.as_ref().err();
+                    let event = json!({ "file": file, "complete": is_complete, "error": error });
+                    self.events.tell("picture", event);
                     self.is_writing &= !exported;
                     match outcome {
                         Ok(()) if exported => {}
                         Ok(()) => {
-                            self.messages.tell(Weight::Note, format!("Wrote {}", file.display()))
+                            let rest = if is_complete { "" } else { ", which was still loading" };
+                            let text = format!("Wrote {}{rest}", file.display());
+                            self.messages.tell(Weight::Note, text);
                         }
                         Err(error) => {
                             self.export = None;

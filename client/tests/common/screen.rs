@@ -14,6 +14,12 @@ use serde_json::Value;
 /// Longest wait for anything: the machine may be busy, and draw in software.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// Longest wait until a click is told; one that takes longer has missed.
+const CLICK: Duration = Duration::from_secs(10);
+
+/// Most attempts to hit a widget, each at another place or [`CLICK`] long.
+const MOST_CLICKS: usize = 40;
+
 /// Between two movements of a hand; a pace, not a wait.
 const PACE_MS: &str = "30";
 
@@ -272,21 +278,45 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Clicks a widget that was there; `false` where it is gone.
+    /// Clicks a widget that was there; `false` where it was gone before it was hit.
     fn press_at(&mut self, role: &str, label: &str, mut at: [i64; 2]) -> bool {
-        // Sections of the panel open smoothly: a hand follows what moves.
-        loop {
+        self.forget_past();
+        // Sections of the panel open smoothly, and where they are is told a moment later: a hand follows what
+        // moves, and clicks again what it has missed.
+        for _ in 0..MOST_CLICKS {
             let [x, y] = at.map(|c| c.to_string());
             self.screen.hand(&["mousemove", &x, &y, "sleep", "0.4"]);
             match self.widget_now(role, label) {
                 None => return false,
-                Some(now) if now == at => break,
+                Some(now) if now == at => {
+                    self.click_at(at[0], at[1], 1);
+                    if self.is_clicked(role, label) {
+                        return true;
+                    }
+                }
                 Some(now) => at = now,
             }
         }
-        self.forget_past();
-        self.click_at(at[0], at[1], 1);
-        true
+        panic!("{role} {label:?} cannot be hit");
+    }
+
+    /// Waits a while until the window tells that it took a click on a widget.
+    fn is_clicked(&self, role: &str, label: &str) -> bool {
+        let end = Instant::now() + CLICK;
+        let mut told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            let mut news = told.events.iter().skip(self.now);
+            let is_it = |event: &Value| event["role"] == role && event["label"] == label;
+            if news.any(|event| event["event"] == "clicked" && is_it(event)) {
+                return true;
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            let waited = self.told.1.wait_timeout(told, left);
+            told = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
     }
 
     /// Chooses an entry of a list that folds out. Where another list is still folding in, the first click
@@ -306,30 +336,6 @@ impl<'a> Window<'a> {
             }
         }
         panic!("{list:?} does not fold out to {entry:?}");
-    }
-
-    /// Clicks a widget until an event tells that it was hit: one that still moves may be missed.
-    pub fn press_until(
-        &mut self,
-        label: &str,
-        name: &str,
-        is_it: impl Fn(&Value) -> bool,
-    ) -> Value {
-        let before = self.told.0.lock().unwrap_or_else(PoisonError::into_inner).events.len();
-        for _ in 0..8 {
-            self.press("Button", label);
-            let end = Instant::now() + Duration::from_secs(5);
-            while Instant::now() < end {
-                let told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
-                let mut news = told.events.iter().skip(before);
-                if let Some(event) = news.find(|event| event["event"] == name && is_it(event)) {
-                    return event.clone();
-                }
-                drop(told);
-                self.screen.hand(&["sleep", "0.05"]);
-            }
-        }
-        panic!("pressing {label:?} does not lead to {name}");
     }
 
     /// Clicks a place of the window so many times.
@@ -373,12 +379,19 @@ impl<'a> Window<'a> {
         self.screen.hand(&["search", "--name", "^lodestream$", "windowsize", &width, &height]);
     }
 
-    /// Writes the picture of the points; returns its file.
+    /// Writes the picture of the points once it is complete; returns its file. What a hand did just before may
+    /// still be going on where the machine is busy.
     pub fn picture(&mut self) -> PathBuf {
-        self.keys(&["F12"]);
-        let event = self.wait("picture", |_| true);
-        assert!(event["error"].is_null(), "{event}");
-        PathBuf::from(event["file"].as_str().expect("a file"))
+        for _ in 0..MOST_CLICKS {
+            self.keys(&["F12"]);
+            let event = self.wait("picture", |_| true);
+            assert!(event["error"].is_null(), "{event}");
+            if event["complete"] == true {
+                return PathBuf::from(event["file"].as_str().expect("a file"));
+            }
+            self.screen.hand(&["sleep", "0.2"]);
+        }
+        panic!("no picture is complete");
     }
 
     /// The process.
