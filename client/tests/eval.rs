@@ -10,7 +10,7 @@ use std::{
 
 use lodestream_client::{
     engine::Policy,
-    eval::{BuildRow, Report, SavingRow},
+    eval::{BuildRow, Report, SavingRow, StreamRun, SubjectReport},
 };
 
 use world::World;
@@ -85,6 +85,7 @@ fn a_report_is_written_and_repeats_to_the_last_digit() {
         assert!(run.samples.iter().all(|sample| (0.0..=1.0).contains(&sample.holes)));
     }
     assert!(subject.streams.iter().any(|run| run.from == "near"), "a jump");
+    heavier_nodes_come_later(subject);
 
     let html = read(&folders[0].join("eval.html"));
     // Without the pictures, whose letters are any.
@@ -105,6 +106,27 @@ fn a_report_is_written_and_repeats_to_the_last_digit() {
         assert!(reader.records().all(|line| line.is_ok()) && !text.contains("NaN"), "{name}");
     }
     compares(&folders[0], &first);
+}
+
+/// Potree's way with the bytes of its own encoding asks for the same nodes, and waits for what they weigh.
+fn heavier_nodes_come_later(subject: &SubjectReport) {
+    let all = subject.potree_bytes.expect("weighed");
+    let mut seen = 0;
+    for race in subject.races() {
+        let of = |policy| race.runs.iter().find(|e| e.run.policy == policy).map(|e| e.run);
+        let (light, heavy) = (of(Policy::Potree), of(Policy::PotreeBrotli));
+        let (light, heavy) = (light.expect("a run"), heavy.expect("a run"));
+        let drawn = |run: &StreamRun| (run.requests, run.points, run.ssim.to_bits());
+        assert_eq!(drawn(light), drawn(heavy), "{}", race.view);
+        if light.bytes == 0 {
+            continue;
+        }
+        assert!(heavy.bytes > light.bytes && heavy.bytes < all + 100_000, "{heavy:?}");
+        assert!(heavy.bound_ms > light.bound_ms, "{heavy:?}");
+        assert!(heavy.settled_ms >= light.settled_ms, "{heavy:?}");
+        seen += 1;
+    }
+    assert!(seen > 1, "races in which something came");
 }
 
 fn build(report: &mut Report) -> &mut BuildRow {
@@ -216,7 +238,7 @@ fn a_bare_cloud_does_without_what_it_does_not_have() {
     evaluated(&[&[SMALL, &*paths[0], "-o", &*paths[1]], &narrow[..]].concat());
     let report = report(&output);
     let [coloured, bare] = report.subjects.as_slice() else { panic!("two datasets") };
-    let shader = |subject: &lodestream_client::eval::SubjectReport| subject.not_stored.shader_bytes;
+    let shader = |subject: &SubjectReport| subject.not_stored.shader_bytes;
     for subject in [bare, coloured] {
         assert!(shader(subject)[0] < shader(subject)[1], "{:?}", shader(subject));
     }
@@ -224,7 +246,7 @@ fn a_bare_cloud_does_without_what_it_does_not_have() {
     assert!(coloured.not_stored.not_fetched.iter().all(|(_, bytes)| *bytes > 0));
     // There is nothing but positions: asking for all attributes brings not a byte more.
     assert_eq!(bare.not_stored.not_fetched, []);
-    let attributes = |subject: &lodestream_client::eval::SubjectReport| {
+    let attributes = |subject: &SubjectReport| {
         let row = subject.left_out.iter().find(|row| row.saving.starts_with("attributes"));
         row.map(|row| (row.with.bytes, row.without.bytes)).expect("a row")
     };
@@ -278,7 +300,10 @@ fn wrong_inputs_are_refused_in_one_line() {
     assert!(refused(&[SMALL, "--budgets", "0"], 1).contains("budget of 0"));
     assert!(refused(&[SMALL, "--stream-budget", "0"], 1).contains("budget of 0"));
     assert!(refused(&[SMALL, "--links", "20"], 2).contains("20mbit/40ms"));
-    assert!(refused(&[SMALL, "--policies", "best"], 2).contains("ours, potree and fraiss"));
+    assert!(
+        refused(&[SMALL, "--policies", "best"], 2)
+            .contains("ours, potree, fraiss and potree-brotli")
+    );
     assert!(refused(&[SMALL, "--splats", "star:1px"], 2).contains("star"));
     assert!(self::refused(&[SMALL, "-o", &text], 1).contains("cannot create"));
     for other in [file("other.json", "{}"), text.clone(), missing] {

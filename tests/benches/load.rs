@@ -3,7 +3,8 @@
 //! `./dev bench load [INPUT] [--runs N]`. INPUT is a dataset or anything that `lodestream build` takes;
 //! without one, a simulated courtyard of 4 million points. A server of the same build hosts it in a
 //! process of its own; `lodestream load` looks at it, first with 1, 10, 100 and 1,000 clients as fast
-//! as it comes, then N times with one client by each policy on 20 Mbit/s and 40 ms, in turn. Server and
+//! as it comes, then N times with one client by each policy on 20 Mbit/s and 40 ms, in turn. The rivals'
+//! policies know no positions in two parts: they fetch from a twin that has them in one. Server and
 //! clients share this machine. The pages stay where the last lines say.
 
 use std::{
@@ -13,7 +14,9 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use lodestream_client::load::{LoadReport, RunReport};
+use lodestream_client::load::{LoadReport, Ratios, RunReport, ratios};
+use lodestream_preprocess::{FileSource, with_whole_positions};
+use lodestream_protocol::Dataset;
 use lodestream_tests::{Options, median, program};
 
 #[path = "support/dataset.rs"]
@@ -28,14 +31,14 @@ const HOLDS: [&str; 8] =
 
 /// The second part: six places, each stayed at for ten seconds.
 const FETCHES: [&str; 8] = [
+    "--clients",
+    "1",
     "--path",
     "teleport?seconds=60&stops=6&factor=10",
     "--loops",
     "1",
     "--link",
     "20mbit/40ms",
-    "--policy",
-    "ours,potree,fraiss",
 ];
 
 fn main() -> Result<()> {
@@ -63,22 +66,34 @@ fn main() -> Result<()> {
         println!("\nThe knee is at {} clients{beyond}.", knee.clients);
     }
 
-    let mut reports = Vec::new();
+    let twin_folder = folder.join("bench_load_twin");
+    std::fs::create_dir_all(&twin_folder)?;
+    let twin = twin_folder.join("whole.lods");
+    with_whole_positions(&Dataset::open(FileSource::open(&dataset)?)?, &twin)?;
+    let twin = Server::start(&twin)?;
+    let mut rounds = Vec::new();
     for run in 1..=runs {
-        let folder = folder.join(format!("bench_load_policies_{run}"));
-        reports.push(load(&server, &folder, &[&["--clients", "1"], &FETCHES[..]].concat())?);
+        let fetch = |server: &Server, policies: &str| {
+            let folder = folder.join(format!("bench_load_{}_{run}", policies.replace(',', "_")));
+            load(server, &folder, &[&FETCHES[..], &["--policy", policies]].concat())
+        };
+        let (ours, theirs) = (fetch(&server, "ours")?, fetch(&twin, "potree,fraiss")?);
+        rounds.push(ratios(&[ours.runs, theirs.runs].concat()));
     }
     println!("\nTimes ours, medians of {runs} (each run's median over its pictures):\n");
     println!(
         "| policy | cold: settled | first picture | bytes | requests | after jumps: settled | first picture | bytes | requests |"
     );
     println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
-    let others = reports[0].ratios.iter().map(|ratio| ratio.policy);
+    let others = rounds[0].iter().map(|ratio| ratio.policy);
     for policy in others {
-        let of = |value: fn(&lodestream_client::load::Ratios) -> Option<f64>| {
-            let ratios = reports.iter().flat_map(|report| &report.ratios);
-            let mut values: Vec<_> =
-                ratios.filter(|ratio| ratio.policy == policy).filter_map(value).collect();
+        let of = |value: fn(&Ratios) -> Option<f64>| {
+            let mut values: Vec<_> = rounds
+                .iter()
+                .flatten()
+                .filter(|ratio| ratio.policy == policy)
+                .filter_map(value)
+                .collect();
             format!("{:.2}x", median(&mut values))
         };
         println!(

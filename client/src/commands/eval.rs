@@ -44,7 +44,7 @@ pub struct EvalArgs {
         long,
         value_name = "POLICY,…",
         value_delimiter = ',',
-        default_value = "ours,potree,fraiss"
+        default_value = "ours,potree-brotli,potree,fraiss"
     )]
     pub policies: Vec<Policy>,
     /// Links: bandwidth / round trip / loss

@@ -51,7 +51,7 @@ pub struct LoadArgs {
     #[arg(long, value_name = "LINK")]
     pub link: Option<LinkSpec>,
     /// Ways to fetch: ours, potree, fraiss; with several, each run is made with each
-    #[arg(long, value_name = "POLICY,…", value_delimiter = ',', default_value = "ours")]
+    #[arg(long, value_name = "POLICY,…", value_delimiter = ',', default_value = "ours", value_parser = hosted)]
     pub policy: Vec<Policy>,
     /// Folder for load.html, load.json and tables of CSV; made if it is missing
     #[arg(short, long, value_name = "DIR")]
@@ -95,6 +95,18 @@ pub struct LoadArgs {
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().and_then(|s| Duration::try_from_secs_f64(s).ok());
     seconds.ok_or_else(|| "expected a number of seconds, such as 30".into())
+}
+
+/// A policy that can fetch what servers host.
+fn hosted(text: &str) -> Result<Policy, String> {
+    match text.parse()? {
+        Policy::PotreeBrotli => {
+            Err("no such files are hosted here: 'eval' has this policy, on made-up \
+                                     links; take potree"
+                .into())
+        }
+        policy => Ok(policy),
+    }
 }
 
 /// Makes the runs and writes the reports. Fails where there was any error.

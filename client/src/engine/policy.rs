@@ -23,11 +23,15 @@ pub enum Policy {
     /// As Fraiss 2017 does (3.2.4, 3.2.6, 4.2): header, then hierarchy, then a queue, a node at a
     /// time in the order in which they were first wanted; nodes down to 10 pixels.
     Fraiss,
+    /// As [`Potree`](Self::Potree), and each node weighs what PotreeConverter 2 makes of it with
+    /// `--encoding BROTLI`. For evaluations: no such files are hosted.
+    #[serde(rename = "potree-brotli")]
+    PotreeBrotli,
 }
 
 impl Policy {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Ours, Self::Potree, Self::Fraiss];
+    pub const ALL: [Self; 4] = [Self::Ours, Self::Potree, Self::Fraiss, Self::PotreeBrotli];
 
     /// As it is written.
     #[must_use]
@@ -36,6 +40,7 @@ impl Policy {
             Self::Ours => "ours",
             Self::Potree => "potree",
             Self::Fraiss => "fraiss",
+            Self::PotreeBrotli => "potree-brotli",
         }
     }
 
@@ -56,7 +61,9 @@ impl Policy {
         };
         match self {
             Self::Ours => config,
-            Self::Potree => EngineConfig { requests_in_flight: 4, min_size_px: 30.0, ..apart },
+            Self::Potree | Self::PotreeBrotli => {
+                EngineConfig { requests_in_flight: 4, min_size_px: 30.0, ..apart }
+            }
             Self::Fraiss => EngineConfig {
                 requests_in_flight: 1,
                 min_size_px: 10.0,
@@ -72,6 +79,8 @@ impl FromStr for Policy {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let found = Self::ALL.into_iter().find(|policy| policy.name() == text);
-        found.ok_or_else(|| format!("no policy {text:?}; there are ours, potree and fraiss"))
+        found.ok_or_else(|| {
+            format!("no policy {text:?}; there are ours, potree, fraiss and potree-brotli")
+        })
     }
 }

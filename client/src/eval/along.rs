@@ -90,7 +90,7 @@ impl Streaming<'_> {
         link: LinkSpec,
         policy: Policy,
     ) -> anyhow::Result<PathRun> {
-        let mut engine = self.subject.engine(self.config.clone(), policy, link, self.seed)?;
+        let mut visitor = self.subject.engine(self.config.clone(), policy, link, self.seed)?;
         let size_px = self.settings.size_px;
         let mut samples = Vec::new();
         let mut pictures: Vec<Picture> = Vec::new();
@@ -100,16 +100,16 @@ impl Streaming<'_> {
                 // In whole nanoseconds: of a fraction of one, there is no end.
                 let left = Duration::try_from_secs_f64(instant.seconds)
                     .unwrap_or_default()
-                    .saturating_sub(engine.time());
+                    .saturating_sub(visitor.engine.time());
                 if left.is_zero() {
                     break;
                 }
-                let camera = path.at(path.start() + engine.time().as_secs_f64());
-                engine.set_view(View { camera, size_px });
-                engine.advance(self.step.min(left));
+                let camera = path.at(path.start() + visitor.engine.time().as_secs_f64());
+                visitor.engine.set_view(View { camera, size_px });
+                visitor.engine.advance(self.step.min(left));
             }
-            engine.set_view(View { camera: instant.camera, size_px });
-            let plan = engine.advance(Duration::ZERO);
+            visitor.engine.set_view(View { camera: instant.camera, size_px });
+            let plan = visitor.engine.advance(Duration::ZERO);
             let settings =
                 crate::render::RenderSettings { camera: instant.camera, ..self.settings };
             let picture = self.picture(&plan, &settings)?;
@@ -118,7 +118,7 @@ impl Streaming<'_> {
                 seconds: instant.seconds,
                 ssim: error.ssim.unwrap_or(f64::NAN),
                 points: plan.points,
-                bytes: engine.stats().since_start.totals.bytes,
+                bytes: visitor.bytes(),
             });
             pictures.push(picture);
         }
@@ -128,7 +128,7 @@ impl Streaming<'_> {
             let truths = [&truths[0].truth, &truths[1].truth];
             popping.extend(Popping::between(pictures, truths)?.map(|popping| popping.rms));
         }
-        let totals = engine.stats().since_start.totals;
+        let totals = visitor.engine.stats().since_start.totals;
         let count = samples.len().max(1) as f64;
         Ok(PathRun {
             path: name.into(),
@@ -138,7 +138,7 @@ impl Streaming<'_> {
             worst_ssim: samples.iter().map(|s| s.ssim).fold(f64::INFINITY, f64::min),
             popping_rms: (!popping.is_empty())
                 .then(|| popping.iter().sum::<f64>() / popping.len() as f64),
-            bytes: totals.bytes,
+            bytes: visitor.bytes(),
             requests: totals.requests,
             cancelled: totals.cancelled,
             samples,

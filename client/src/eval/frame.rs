@@ -56,7 +56,7 @@ fn settled(
     view: View,
     cancel: &AtomicBool,
 ) -> anyhow::Result<Arc<FramePlan>> {
-    let mut engine = subject.engine(config, Policy::Ours, AT_ONCE, 0)?;
+    let mut engine = subject.engine(config, Policy::Ours, AT_ONCE, 0)?.engine;
     engine.set_view(view);
     loop {
         let plan = advance(&mut engine, Duration::from_millis(100), cancel)?;

@@ -177,7 +177,7 @@ fn cost(
     let reach = settings.splat_reach().filter(|_| config.occlusion);
     // The plan whose depths were told last.
     let mut told = None;
-    let mut engine = subject.engine(config, Policy::Ours, link, seed)?;
+    let mut engine = subject.engine(config, Policy::Ours, link, seed)?.engine;
     engine.set_view(View { camera: settings.camera, size_px: settings.size_px });
     let plan = loop {
         let plan = advance(&mut engine, FRAME, cancel)?;

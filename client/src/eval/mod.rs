@@ -2,6 +2,7 @@
 //!
 //! - `views.rs`: where pictures are taken from, by rule;
 //! - `subject.rs`: a dataset and the truth of any view of it;
+//! - `potree.rs`: what a node weighs in a rival's encoding;
 //! - `frame.rs`: milliseconds per frame and error;
 //! - `stream.rs`: error over time while a view streams in;
 //! - `along.rs`: error along a camera path, without waiting;
@@ -16,6 +17,7 @@ mod curve;
 mod frame;
 mod left_out;
 mod page;
+mod potree;
 mod report;
 mod run;
 mod stream;
@@ -31,5 +33,5 @@ pub use page::page;
 pub use report::{BuildRow, Entrant, NoiseRow, Race, Report, SubjectReport};
 pub use run::{EvalConfig, Exhibit, run};
 pub use stream::{LEVELS, Stop, StreamRun, Streaming};
-pub use subject::Subject;
+pub use subject::{Subject, Visitor};
 pub use views::ViewSize;

@@ -97,7 +97,7 @@ fn tiles(report: &Report) -> Vec<(String, String, Tone)> {
             tone,
         ));
     }
-    for policy in [Policy::Potree, Policy::Fraiss] {
+    for policy in [Policy::PotreeBrotli, Policy::Potree, Policy::Fraiss] {
         let Some(rival) = of(policy) else { continue };
         let factor = rival.area / ours.area;
         let tone = if factor >= 1.0 { Tone::Good } else { Tone::Bad };

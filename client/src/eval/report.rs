@@ -43,6 +43,9 @@ pub struct SubjectReport {
     pub points: u64,
     /// Of the file.
     pub bytes: u64,
+    /// Of all nodes in the encoding of PotreeConverter 2 (BROTLI), where they were weighed.
+    #[serde(default)]
+    pub potree_bytes: Option<u64>,
     /// How it was built, where that was part of it.
     pub build: Option<BuildRow>,
     /// View by view.

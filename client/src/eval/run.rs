@@ -107,11 +107,9 @@ pub fn run(
                 subject.name = format!("{} {}", subject.name, build.method);
             }
             subject.name = unique(&subject.name, opened.iter().map(|(other, _)| &*other.name));
-            if config.policies.iter().any(|policy| *policy != Policy::Ours) {
-                let folder = tempfile::tempdir_in(scratch.path());
-                subject
-                    .prepare_rivals(&folder.context("cannot make a temporary folder")?.keep())?;
-            }
+            let folder = tempfile::tempdir_in(scratch.path());
+            let folder = folder.context("cannot make a temporary folder")?.keep();
+            subject.prepare_rivals(&folder, &config.policies)?;
             opened.push((subject, build));
         }
     }
@@ -389,6 +387,7 @@ fn evaluate(
         name: name.clone(),
         points: subject.manifest().points,
         bytes: std::fs::metadata(&subject.path).map_or(0, |file| file.len()),
+        potree_bytes: subject.potree_bytes(),
         build,
         noise,
         frames,

@@ -13,11 +13,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     curve::{self, Reached, Sample},
-    subject::Subject,
+    subject::{Subject, Visitor},
 };
 use crate::{
     camera::Camera,
-    engine::{EngineConfig, FramePlan, Policy, SimulatedEngine, View},
+    engine::{EngineConfig, FramePlan, Policy, View},
     interrupt::go_on,
     metrics::PictureError,
     render::{Picture, RenderSettings, TruthRenderer, VisibleTree},
@@ -111,14 +111,14 @@ impl Streaming<'_> {
         link: LinkSpec,
         policy: Policy,
     ) -> anyhow::Result<Vec<StreamRun>> {
-        let mut engine = self.subject.engine(self.config.clone(), policy, link, self.seed)?;
+        let mut visitor = self.subject.engine(self.config.clone(), policy, link, self.seed)?;
         let mut from = "cold".to_owned();
         let mut runs = Vec::new();
         for stop in stops {
             let truth = truths
                 .get(&stop.name)
                 .ok_or_else(|| anyhow::anyhow!("no truth was drawn of the view {}", stop.name))?;
-            let mut run = self.stop(&mut engine, stop, truth, link, runs.is_empty())?;
+            let mut run = self.stop(&mut visitor, stop, truth, link, runs.is_empty())?;
             run.link = link.to_string();
             run.policy = policy;
             run.from = std::mem::replace(&mut from, stop.name.clone());
@@ -129,15 +129,15 @@ impl Streaming<'_> {
 
     fn stop(
         &self,
-        engine: &mut SimulatedEngine,
+        visitor: &mut Visitor,
         stop: &Stop,
         truth: &Picture,
         link: LinkSpec,
         is_cold: bool,
     ) -> anyhow::Result<StreamRun> {
         let settings = RenderSettings { camera: stop.camera, ..self.settings };
-        engine.set_view(View { camera: stop.camera, size_px: settings.size_px });
-        let start = engine.time();
+        visitor.engine.set_view(View { camera: stop.camera, size_px: settings.size_px });
+        let (start, bytes_before) = (visitor.engine.time(), visitor.bytes());
         let mut samples: Vec<Sample> = Vec::new();
         let mut seen: Option<Arc<FramePlan>> = None;
         let mut plan: Arc<FramePlan>;
@@ -146,6 +146,7 @@ impl Streaming<'_> {
         loop {
             go_on(self.cancel)?;
             // To the timer's step, so that what comes after the end is told apart.
+            let engine = &mut visitor.engine;
             let due = engine.time() + step;
             plan = engine.advance(Duration::ZERO);
             while engine.time() < due && !plan.settled {
@@ -155,13 +156,13 @@ impl Streaming<'_> {
             if let Some(problem) = engine.stats().problems.first() {
                 anyhow::bail!("{problem}");
             }
-            let totals = engine.stats().since_view.totals;
+            let (now, requests) = (engine.time(), engine.stats().since_view.totals.requests);
             if seen.is_none_or(|seen| !draws_the_same(&seen, &plan)) {
                 let error = self.error(&plan, &settings, truth)?;
                 samples.push(Sample {
-                    ms: (engine.time() - start).as_secs_f64() * 1e3,
-                    bytes: totals.bytes,
-                    requests: totals.requests,
+                    ms: (now - start).as_secs_f64() * 1e3,
+                    bytes: visitor.bytes() - bytes_before,
+                    requests,
                     points: plan.points,
                     ssim: error.ssim.unwrap_or(f64::NAN),
                     mse: error.mse.unwrap_or(f64::NAN),
@@ -169,20 +170,18 @@ impl Streaming<'_> {
                 });
             }
             seen = Some(Arc::clone(&plan));
-            if plan.settled || engine.time() - start >= self.patience {
+            if plan.settled || now - start >= self.patience {
                 break;
             }
         }
-        let needed_bytes = engine.stats().since_view.totals.bytes;
+        let needed_bytes = visitor.bytes() - bytes_before;
         // What was asked for in vain comes too, before the next view.
         let rest = TIMER_STEP.max(2 * link.round_trip) + Duration::from_secs(1);
         let mut bytes = None;
-        while bytes.replace(engine.stats().since_view.totals.bytes)
-            != Some(engine.stats().since_view.totals.bytes)
-        {
-            engine.advance(rest);
+        while bytes.replace(visitor.bytes()) != Some(visitor.bytes()) {
+            visitor.engine.advance(rest);
         }
-        let phase = engine.stats().since_view;
+        let phase = visitor.engine.stats().since_view;
         let bound = match needed_bytes {
             _ if is_cold => link.bound(needed_bytes),
             0 => Duration::ZERO,
@@ -195,7 +194,7 @@ impl Streaming<'_> {
             link: String::new(),
             policy: Policy::Ours,
             settled_ms: phase.settled_ms,
-            bytes: phase.totals.bytes,
+            bytes: visitor.bytes() - bytes_before,
             requests: phase.totals.requests,
             points: plan.points,
             ssim: samples.last().map_or(f64::NAN, |sample| sample.ssim),

@@ -1,6 +1,7 @@
 //! A dataset under evaluation: its file, its tree, and the truth of any view of it.
 
 use std::{
+    collections::HashMap,
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool},
     time::Duration,
@@ -16,8 +17,10 @@ use crate::{
     full_resolution,
     interrupt::go_on,
     render::{Picture, RenderSettings, TruthRenderer, VisibleTree},
-    source::{FileSource, Link, LinkSpec, Source},
+    source::{FileSource, ForeignSizes, Link, LinkSpec, Source},
 };
+
+use super::potree;
 
 /// An open dataset.
 pub struct Subject {
@@ -33,6 +36,8 @@ pub struct Subject {
     pub middle: DVec3,
     /// The same points with positions in one part, where the file has them in two.
     whole: Option<PathBuf>,
+    /// What nodes weigh in Potree's encoding, by where they begin in that file.
+    potree: Option<Arc<HashMap<u64, u64>>>,
     dataset: Dataset<PositionedFile>,
     /// The nodes that hold every point once.
     nodes: Vec<Node>,
@@ -66,6 +71,7 @@ impl Subject {
         Ok(Self {
             name: name.unwrap_or_default(),
             whole: None,
+            potree: None,
             path: path.to_owned(),
             clouds: vec![manifest],
             bounds: [bounds.0.into(), bounds.1.into()],
@@ -82,17 +88,29 @@ impl Subject {
     }
 
     /// Prepares for the rivals' policies: they know no positions in two parts, and fetch of every node a
-    /// range that holds all of it. So they fetch from a twin, which is written to `folder`.
+    /// range that holds all of it. So they fetch from a twin, which is written to `folder`. For one of them
+    /// the nodes are weighed in its own encoding.
     ///
     /// # Errors
-    /// Where the twin cannot be written.
-    pub fn prepare_rivals(&mut self, folder: &Path) -> anyhow::Result<()> {
-        if self.manifest().fine.is_some() {
+    /// Where the twin cannot be written or read.
+    pub fn prepare_rivals(&mut self, folder: &Path, policies: &[Policy]) -> anyhow::Result<()> {
+        if self.manifest().fine.is_some() && policies.iter().any(|p| *p != Policy::Ours) {
             let path = folder.join(format!("{}.lods", self.name));
             with_whole_positions(&self.dataset, &path)?;
             self.whole = Some(path);
         }
+        if policies.contains(&Policy::PotreeBrotli) {
+            let path = self.whole.as_ref().unwrap_or(&self.path);
+            let dataset = Dataset::open(PositionedFile::open(path)?)?;
+            self.potree = Some(Arc::new(potree::node_bytes(&dataset)?));
+        }
         Ok(())
+    }
+
+    /// Bytes of all nodes in Potree's encoding, where they were weighed.
+    #[must_use]
+    pub fn potree_bytes(&self) -> Option<u64> {
+        self.potree.as_ref().map(|nodes| nodes.values().sum())
     }
 
     /// An engine that fetches the dataset by such a link and policy, in simulated time.
@@ -105,14 +123,20 @@ impl Subject {
         policy: Policy,
         link: LinkSpec,
         seed: u64,
-    ) -> anyhow::Result<SimulatedEngine> {
+    ) -> anyhow::Result<Visitor> {
         let path = match (policy, &self.whole) {
-            (Policy::Potree | Policy::Fraiss, Some(whole)) => whole,
+            (Policy::Potree | Policy::PotreeBrotli | Policy::Fraiss, Some(whole)) => whole,
             _ => &self.path,
         };
         let config = policy.apply(config);
-        let source = Source::linked(FileSource::open(path)?, Link::new(link, seed));
-        Ok(SimulatedEngine::start(vec![source], config)?)
+        let (file, link) = (FileSource::open(path)?, Link::new(link, seed));
+        let weighed = self.potree.as_ref().filter(|_| policy == Policy::PotreeBrotli);
+        let foreign = weighed.map(|sizes| Arc::new(ForeignSizes::new(Arc::clone(sizes))));
+        let source = match &foreign {
+            Some(foreign) => Source::linked_as(file, link, Arc::clone(foreign)),
+            None => Source::linked(file, link),
+        };
+        Ok(Visitor { engine: SimulatedEngine::start(vec![source], config)?, foreign })
     }
 
     /// The nodes that hold every point once.
@@ -149,6 +173,23 @@ impl Subject {
             }
         }
         Ok(renderer.finish()?.picture)
+    }
+}
+
+/// Who fetches a dataset.
+pub struct Visitor {
+    /// The engine.
+    pub engine: SimulatedEngine,
+    /// Where its nodes weigh something else than their bytes in the file.
+    foreign: Option<Arc<ForeignSizes>>,
+}
+
+impl Visitor {
+    /// Bytes that came by the link since the start.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let extra = self.foreign.as_ref().map_or(0, |foreign| foreign.extra());
+        self.engine.stats().since_start.totals.bytes.saturating_add_signed(extra)
     }
 }
 

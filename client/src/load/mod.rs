@@ -28,7 +28,7 @@ pub use itinerary::{Itinerary, Stop};
 pub use knee::Knee;
 pub use page::page;
 pub use process::ProcessReport;
-pub use ratio::Ratios;
+pub use ratio::{Ratios, ratios};
 pub use report::{
     ArrivalReport, ByteReport, FORMAT, IntervalReport, LoadReport, LookReport, RequestReport,
     RunReport, VERSION, Visits,

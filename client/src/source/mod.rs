@@ -35,7 +35,7 @@ pub use fault::Fault;
 pub use file::FileSource;
 pub use http::HttpSource;
 pub use link::{Link, LinkSpec};
-pub use linked::LinkedSource;
+pub use linked::{ForeignSizes, LinkedSource};
 pub use listing::{datasets_of_folder, is_server, list_datasets};
 pub use meter::{Counted, Meter, Traffic};
 pub use token::use_token;
@@ -128,7 +128,13 @@ impl Source {
     /// The file behind a made-up link, for measuring what links do.
     #[must_use]
     pub const fn linked(file: FileSource, link: Arc<Link>) -> Self {
-        Self::Linked(LinkedSource::new(file, link))
+        Self::Linked(LinkedSource::new(file, link, None))
+    }
+
+    /// The same, where the link carries what the file's ranges would weigh in another encoding.
+    #[must_use]
+    pub const fn linked_as(file: FileSource, link: Arc<Link>, foreign: Arc<ForeignSizes>) -> Self {
+        Self::Linked(LinkedSource::new(file, link, Some(foreign)))
     }
 
     /// The source for people: a path, or a URL without credentials and query.
