@@ -265,9 +265,11 @@ fn a_run_is_bounded_in_requests_clients_and_time() {
     refused(&["--clients", "0"], "1 to 10000");
     refused(&["--clients", "10001"], "1 to 10000");
     refused(&["--duration", "3601"], "3600");
-    refused(&["--policy", "potree-brotli"], "take potree");
     refused(&["--path", "nowhere.json"], "no such file");
     refused(&["--views-per-second", "0"], "0.1 to 120");
+    let output = load(&url, folder.path(), &["--policy", "potree-brotli"]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("take potree"));
     assert_eq!(host.requests().len(), asked, "what is refused asks for nothing");
 
     let spent = ["--path", "orbit?seconds=2", "--duration", "60", "--most-requests", "40"];
