@@ -38,7 +38,8 @@ pub struct ServeConfig {
     pub rate: Option<RateLimit>,
     /// How long a client may take to send a request's head, and how long an idle connection stays.
     pub head_timeout: Duration,
-    /// How long a client may leave the bytes of a response untaken before it is cut off.
+    /// How long a client may leave the bytes of a response untaken before it is cut off; over HTTP/2, how long
+    /// it may take for 16 KiB of what it asked for.
     pub write_timeout: Duration,
     /// How long a handler may take until its response starts.
     pub response_timeout: Duration,

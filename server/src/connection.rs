@@ -1,9 +1,18 @@
 //! One client's connection.
 
-use std::{io::Cursor, net::SocketAddr, pin::Pin, sync::Arc, time::Duration};
+use std::{
+    io::Cursor,
+    net::SocketAddr,
+    pin::{Pin, pin},
+    sync::Arc,
+    time::Duration,
+};
 
 use axum::Router;
-use hyper::server::conn::{http1, http2};
+use hyper::{
+    server::conn::{http1, http2},
+    service::{Service, service_fn},
+};
 use hyper_util::{
     rt::{TokioExecutor, TokioIo, TokioTimer},
     server::graceful::Watcher,
@@ -18,7 +27,7 @@ use tokio::{
 use tokio_io_timeout::TimeoutStream;
 use tower_http::add_extension::AddExtension;
 
-use crate::{config::ServeConfig, hot, peer::Peer, routes::Site, tls::Tls};
+use crate::{activity::Activity, config::ServeConfig, hot, peer::Peer, routes::Site, tls::Tls};
 
 /// Most bytes of a request's head, and of a response waiting for the client besides the piece that
 /// was read last.
@@ -91,15 +100,15 @@ async fn converse(
             }
         };
         let is_http2 = stream.get_ref().1.alpn_protocol() == Some(b"h2");
-        return speak(stream, is_http2, peer, host, watcher).await;
+        return speak(stream, is_http2, peer, host, watcher, stopping).await;
     }
-    let begun = hot::serve(&stream, &host.site, limits, stopping).await;
+    let begun = hot::serve(&stream, &host.site, limits, stopping.clone()).await;
     let Some(begun) = begun else { return Ok(()) };
     let is_http2 = PREFACE.starts_with(&begun) || begun.starts_with(PREFACE);
     let (reader, writer) = stream.into_split();
     // What was read of a request already comes first.
     let stream = tokio::io::join(Cursor::new(begun).chain(reader), writer);
-    speak(limited(stream, limits), is_http2, peer, host, watcher).await
+    speak(limited(stream, limits), is_http2, peer, host, watcher, stopping).await
 }
 
 fn limited<S>(stream: S, limits: ConnectionLimits) -> Pin<Box<TimeoutStream<S>>>
@@ -117,6 +126,7 @@ async fn speak<S>(
     peer: Peer,
     host: &Host,
     watcher: Watcher,
+    mut stopping: watch::Receiver<bool>,
 ) -> Result<(), Failure>
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
@@ -131,7 +141,26 @@ where
             .max_header_list_size(MAX_QUEUED_BYTES as u32)
             .keep_alive_interval(Some(limits.head_timeout))
             .keep_alive_timeout(limits.write_timeout);
-        watcher.watch(builder.serve_connection(stream, service)).await?;
+        let activity = Activity::new();
+        let watched = service_fn(|request| {
+            let (handling, answer) = (activity.begin(), service.call(request));
+            async { answer.await.map(|response| handling.watch(response)) }
+        });
+        let mut connection = pin!(builder.serve_connection(stream, watched));
+        let is_over = tokio::select! {
+            ended = &mut connection => return Ok(ended?),
+            () = activity.end(limits) => true,
+            () = stop(&mut stopping) => false,
+        };
+        connection.as_mut().graceful_shutdown();
+        if is_over {
+            // What is not taken now never will be.
+            timeout(limits.write_timeout, connection).await??;
+        } else {
+            connection.await?;
+        }
+        // The server waits until all watchers are gone.
+        drop(watcher);
     } else {
         let mut builder = http1::Builder::new();
         builder
@@ -141,4 +170,10 @@ where
         watcher.watch(builder.serve_connection(stream, service)).await?;
     }
     Ok(())
+}
+
+/// Waits until the server stops.
+async fn stop(stopping: &mut watch::Receiver<bool>) {
+    // Where nobody is left to say so, it has.
+    let _ = stopping.wait_for(|stop| *stop).await;
 }

@@ -21,6 +21,7 @@
 pub mod access;
 pub mod commands;
 
+mod activity;
 mod body;
 mod buffers;
 mod conditional;

@@ -1,7 +1,7 @@
 //! Clients that are many, slow, or up to no good.
 
 use std::{
-    io::{Read, Write},
+    io::{ErrorKind, Read, Write},
     net::{SocketAddr, TcpStream},
     sync::Arc,
     time::Duration,
@@ -13,6 +13,7 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use crate::{
     clients::{Client, Crowd},
     file::dataset,
+    frames::{FrameClient, GOAWAY},
 };
 
 fn serve(
@@ -83,6 +84,54 @@ fn clients_that_send_a_byte_now_and_then_are_cut_off_and_keep_nobody_waiting() {
     }
     crowd.tally.wait_for_good(50);
     crowd.stop();
+}
+
+#[test]
+fn connections_of_http2_end_where_nothing_is_asked_or_taken() {
+    let (_folder, server, _file) = serve(|config| {
+        config.head_timeout = Duration::from_millis(300);
+        config.write_timeout = Duration::from_millis(300);
+    });
+    // It never gets as far as a frame.
+    let mut silent = TcpStream::connect(server.addr()).expect("the server accepts");
+    silent.set_read_timeout(Some(Duration::from_secs(30))).expect("a time");
+    silent.write_all(b"PRI * HTTP/2.0\r\n\r\n").expect("the server reads");
+    let mut rest = Vec::new();
+    // Closed, or reset: an error that is no timeout.
+    let ended = silent.read_to_end(&mut rest).map_err(|e| e.kind());
+    assert!(!matches!(ended, Err(ErrorKind::WouldBlock | ErrorKind::TimedOut)), "{ended:?}");
+
+    // It answers every ping, and asks for nothing.
+    let mut idle = FrameClient::connect(server.addr(), 65_535);
+    let frames: Vec<u8> = std::iter::from_fn(|| idle.next()).collect();
+    assert!(frames.contains(&GOAWAY), "it is told: {frames:?}");
+
+    // It asks for a file and takes none of it.
+    let mut stalled = FrameClient::connect(server.addr(), 0);
+    stalled.get(1, "/a.lods").expect("the server reads");
+    while stalled.next().is_some() {}
+    assert_eq!(stalled.data_bytes, 0);
+}
+
+#[test]
+fn a_slow_client_of_http2_is_kept_as_long_as_it_takes_something() {
+    let (_folder, server, _file) = serve(|config| {
+        config.head_timeout = Duration::from_secs(2);
+        config.write_timeout = Duration::from_secs(2);
+    });
+    let mut slow = FrameClient::connect(server.addr(), 0);
+    slow.get(1, "/a.lods").expect("the server reads");
+    // Longer than any time that is allowed.
+    for step in 1..=60 {
+        // The stream, and the connection that it shares.
+        slow.allow(1, 1500).and_then(|()| slow.allow(0, 1500)).expect("the server reads");
+        while slow.data_bytes < 1500 * step {
+            let frame = slow.next();
+            assert!(frame.is_some_and(|kind| kind != GOAWAY), "{frame:?} after {step} steps");
+        }
+        // Slow is what it is.
+        std::thread::sleep(Duration::from_millis(50));
+    }
 }
 
 #[test]

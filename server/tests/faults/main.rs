@@ -7,4 +7,5 @@ mod crowds;
 #[path = "../http/file.rs"]
 mod file;
 mod files;
+mod frames;
 mod process;
