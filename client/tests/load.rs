@@ -7,7 +7,8 @@ mod dataset;
 mod host;
 
 use std::{
-    io::{BufRead, BufReader},
+    io::{BufRead, BufReader, Read, Write},
+    net::TcpStream,
     path::Path,
     process::{Child, Command, Output, Stdio},
     sync::mpsc::channel,
@@ -46,6 +47,29 @@ impl Server {
     fn dataset(&self) -> String {
         format!("{}/dataset", self.url)
     }
+
+    /// What it tells Prometheus of the dataset's requests.
+    fn counted(&self) -> Counted {
+        let host = self.url.trim_start_matches("http://");
+        let mut stream = TcpStream::connect(host).expect("the server accepts");
+        write!(stream, "GET /metrics HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n\r\n")
+            .expect("the server reads");
+        let mut text = String::new();
+        stream.read_to_string(&mut text).expect("an answer");
+        let sum = |name: &str, kinds: &[&str]| {
+            let lines = text.lines().filter(|line| {
+                line.starts_with(&format!("lodestream_{name}_total{{dataset=\"dataset\""))
+                    && kinds.iter().any(|kind| line.contains(&format!("kind=\"{kind}\"")))
+            });
+            let value = |line: &str| line.rsplit(' ').next().and_then(|n| n.parse::<u64>().ok());
+            lines.map(|line| value(line).expect("a number")).sum()
+        };
+        Counted {
+            requests: sum("requests", &["file", "batch"]),
+            batches: sum("requests", &["batch"]),
+            bytes: sum("response_bytes", &["file", "batch"]),
+        }
+    }
 }
 
 impl Drop for Server {
@@ -53,6 +77,14 @@ impl Drop for Server {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
+}
+
+/// Of the dataset's file, by range and by batch.
+#[derive(Debug)]
+struct Counted {
+    requests: u64,
+    batches: u64,
+    bytes: u64,
 }
 
 fn load(url: &str, folder: &Path, args: &[&str]) -> Output {
@@ -125,6 +157,30 @@ fn the_figures_are_the_hosts_own() {
     assert_eq!(summed, run.nodes.came + run.nodes.given_up);
     assert!(run.nodes.p50_ms <= run.nodes.p99_ms);
     assert!(run.cold.first.p50_ms <= run.cold.settled.p50_ms);
+}
+
+#[test]
+fn the_server_counts_what_the_report_tells() {
+    let (folder, _) = write(&dataset(recipe()));
+    let server = Server::start(folder.path());
+    // Ours asks a server of ours by batches, the other by ranges alone.
+    for policy in ["ours", "potree"] {
+        let path = ["--path", "teleport?seconds=2&stops=2", "--loops", "2", "--clients", "3"];
+        let args = [&path[..], &["--policy", policy]].concat();
+        // What it takes to find out where the dataset lies comes twice: here, before it is refused.
+        let before = server.counted();
+        load(&server.dataset(), folder.path(), &["--path", "orbit?seconds=5000"]);
+        let opened = server.counted();
+        expect_success(&load(&server.dataset(), folder.path(), &args));
+        let after = server.counted();
+        let own = |of: fn(&Counted) -> u64| of(&after) - of(&opened) - (of(&opened) - of(&before));
+        let run = &report(folder.path()).runs[0];
+        assert_eq!(own(|c| c.requests), run.requests.sent, "{policy}: {run:?}");
+        if run.requests.broken_off == 0 {
+            assert_eq!(own(|c| c.bytes), run.bytes.received, "{policy}: {run:?}");
+        }
+        assert_eq!(own(|c| c.batches) > 0, policy == "ours");
+    }
 }
 
 #[test]

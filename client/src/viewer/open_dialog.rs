@@ -88,12 +88,15 @@ impl Viewer {
     /// Says what happens to a file that is held above the window.
     pub fn show_drop_hint(&self, context: &egui::Context) {
         let palette = Palette::of(self.settings.theme);
-        let id = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop"));
-        let painter = context.layer_painter(id);
-        painter.rect_filled(self.view_rect, 0.0, palette.shade.gamma_multiply(0.8));
-        let font = egui::FontId::proportional(22.0);
-        let text = "Drop it to open it";
-        painter.text(self.view_rect.center(), Align2::CENTER_CENTER, text, font, palette.text);
+        let area = egui::Area::new(egui::Id::unique("drop"))
+            .order(egui::Order::Foreground)
+            .interactable(false)
+            .fixed_pos(self.view_rect.min);
+        area.show(context, |ui| {
+            ui.painter().rect_filled(self.view_rect, 0.0, palette.shade.gamma_multiply(0.8));
+            let text = RichText::new("Drop it to open it").size(22.0).color(palette.text);
+            ui.put(self.view_rect, egui::Label::new(text).selectable(false));
+        });
     }
 
     /// Shows the dialog, if it is open.

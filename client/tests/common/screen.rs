@@ -54,6 +54,11 @@ impl Screen {
         Self { server, display: format!(":{}", number.trim()), folder }
     }
 
+    /// Its name, for programs.
+    pub fn display(&self) -> &str {
+        &self.display
+    }
+
     /// What is on it: red, green, blue, alpha.
     pub fn picture(&self) -> (u32, u32, Vec<u8>) {
         // Xvfb keeps the screen in a file, as the X Window Dump that "xwd" writes.

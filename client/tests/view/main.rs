@@ -1,6 +1,8 @@
 //! `lodestream view`: a real window on a real screen, moved by real input.
 #![cfg(target_os = "linux")]
 
+#[path = "../common/drag.rs"]
+mod drag;
 #[path = "../common/screen.rs"]
 mod screen;
 #[path = "../common/world.rs"]
@@ -8,6 +10,7 @@ mod world;
 
 mod bad_cases;
 mod clouds;
+mod drop;
 mod explore;
 mod paths;
 

@@ -14,6 +14,7 @@ use crate::{
     clients::{Client, Crowd},
     file::dataset,
     frames::{FrameClient, GOAWAY},
+    process::Program,
 };
 
 fn serve(
@@ -28,22 +29,18 @@ fn serve(
     (folder, spawn(config).expect("port 0 is free"), file)
 }
 
-/// Memory of this process, which is the server's and the clients'.
-fn resident_bytes() -> u64 {
-    let statm = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
-    let pages = statm.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok());
-    pages.unwrap_or(0) * 4096
-}
-
 #[test]
 fn ten_thousand_idle_connections_cost_little_and_keep_nobody_out() {
     let limit = getrlimit(Resource::Nofile);
     let raised = Rlimit { current: limit.maximum, maximum: limit.maximum };
     setrlimit(Resource::Nofile, raised).expect("within its own maximum");
-    // Both ends are in this process; a system that allows fewer files gets as many as it allows.
-    let most = limit.maximum.map_or(10_000, |most| (most.saturating_sub(500) / 2).min(10_000));
-    let (_folder, server, file) = serve(|config| config.max_connections = 20_000);
-    let before = resident_bytes();
+    // Each end is a process of its own; a system that allows fewer files gets as many as it allows.
+    let most = limit.maximum.map_or(10_000, |most| most.saturating_sub(500).min(10_000));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = Arc::new(dataset(1, 2_000_000));
+    std::fs::write(folder.path().join("a.lods"), &*file).expect("writable");
+    let server = Program::with(folder.path(), "127.0.0.1:0", &["--max-connections", "20000"]);
+    let before = server.resident_bytes();
     let idle: Vec<_> = (0..most)
         .map(|i| {
             let mut client = Client::connect(server.addr()).expect("the server accepts");
@@ -55,7 +52,7 @@ fn ten_thousand_idle_connections_cost_little_and_keep_nobody_out() {
             client
         })
         .collect();
-    let each = resident_bytes().saturating_sub(before) / most;
+    let each = server.resident_bytes().saturating_sub(before) / most;
     println!("{most} idle connections, {each} bytes each");
     assert!(each < 16 << 10, "{each} bytes for each idle connection");
     let crowd = Crowd::start(server.addr(), "/a.lods", 4, move |_| Arc::clone(&file));

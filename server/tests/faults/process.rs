@@ -11,17 +11,23 @@ use std::{
 use crate::{clients::Crowd, file::dataset};
 
 /// The real program, killed when dropped.
-struct Program {
+pub struct Program {
     child: Child,
     addr: SocketAddr,
 }
 
 impl Program {
-    fn start(folder: &Path, listen: &str) -> Self {
+    pub fn start(folder: &Path, listen: &str) -> Self {
+        Self::with(folder, listen, &[])
+    }
+
+    /// With further arguments.
+    pub fn with(folder: &Path, listen: &str, arguments: &[&str]) -> Self {
         // The port of the one before may be taken for a moment yet.
         loop {
             let mut command = Command::new(env!("CARGO_BIN_EXE_lodestream-server"));
             command.arg("serve").arg(folder).args(["--listen", listen]);
+            command.args(arguments);
             let mut child = command.stdout(Stdio::piped()).spawn().expect("the program is there");
             let mut line = String::new();
             let mut stdout = BufReader::new(child.stdout.take().expect("piped"));
@@ -31,6 +37,18 @@ impl Program {
             }
             child.wait().expect("it has ended");
         }
+    }
+
+    pub fn addr(&self) -> SocketAddr {
+        self.addr
+    }
+
+    /// Memory that it holds.
+    pub fn resident_bytes(&self) -> u64 {
+        let statm = std::fs::read_to_string(format!("/proc/{}/statm", self.child.id()));
+        let statm = statm.unwrap_or_default();
+        let pages = statm.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok());
+        pages.unwrap_or(0) * 4096
     }
 }
 

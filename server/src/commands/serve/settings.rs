@@ -326,6 +326,18 @@ mod tests {
     }
 
     #[test]
+    fn the_defaults_are_the_same_wherever_they_stand() {
+        let settings = Settings { data: Some("/srv".into()), ..Settings::default() };
+        let mut config = settings.resolve().expect("sound");
+        // A program has a log, a part of one need not.
+        config.access_log = false;
+        assert_eq!(config, ServeConfig::new("/srv", SocketAddr::from(([127, 0, 0, 1], 8080))));
+        let deployed = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy/lodestream.toml");
+        let deployed = Settings::read(&deployed).expect("sound");
+        assert_eq!((deployed.limits, deployed.cache), (settings.limits, settings.cache));
+    }
+
+    #[test]
     fn secrets_are_not_printed() {
         let mut settings = Settings::default();
         for (name, value) in [("aws_secret_access_key", "hush"), ("sas", "hush"), ("region", "eu")]
