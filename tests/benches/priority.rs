@@ -5,8 +5,8 @@
 //! at 20 Mbit/s and 40 ms; how the order of arrival goes with a node's size in the picture (rank
 //! correlation: -1 where the largest come first) and, among nodes of the same size, with its distance from
 //! the middle (partial rank correlation: 1 where the middle comes first); and how far the loading is, in
-//! percent of its time, when the mean node of that kind comes. Second table: ten places, a second each; bytes
-//! received, and which part of them was of no use because the view had left or the request was broken
+//! percent of its time, when the mean node of that kind comes. Second table: five walks of ten places, a second
+//! each; bytes received, and which part of them was of no use because the view had left or the request was broken
 //! off.
 
 use std::{error::Error, path::Path};
@@ -31,6 +31,9 @@ use arrival::{Arrival, arrivals, correlations, jump};
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
+/// Walks of the second table.
+const WALKS: u32 = 5;
+
 const LINKS: [&str; 4] = ["4mbit/100ms", "20mbit/40ms", "20mbit/40ms/1%", "100mbit/20ms"];
 
 fn main() -> Result<()> {
@@ -47,22 +50,32 @@ fn main() -> Result<()> {
     }
     println!("\n| link | broken off | MB | in vain | MB without | in vain without |");
     println!("| --- | ---: | ---: | ---: | ---: | ---: |");
-    let path =
-        PathSpec::parse("teleport?stops=10&seconds=10&seed=2")?.path(&Extent::new(min, max)?)?;
+    let extent = Extent::new(min, max)?;
+    let path = |seed| {
+        let path = PathSpec::parse(&format!("teleport?stops=10&seconds=10&seed={seed}"))?;
+        path.path(&extent)
+    };
+    let paths = (1..=WALKS).map(path).collect::<std::result::Result<Vec<_>, _>>()?;
     for link in LINKS {
         let run = |cancels| {
             let config = EngineConfig { cancels, ..EngineConfig::default() };
-            Ok::<_, String>(jump(&dataset, config, link.parse()?, &path))
+            let mut sum = (0, 0, 0);
+            for path in &paths {
+                let totals = jump(&dataset, config.clone(), link.parse()?, path);
+                sum.0 += totals.cancelled;
+                sum.1 += totals.bytes;
+                sum.2 += totals.wasted_bytes();
+            }
+            Ok::<_, String>(sum)
         };
-        let (with, without) = (run(true)?, run(false)?);
+        let ((broken_off, bytes, wasted), (_, all, without)) = (run(true)?, run(false)?);
         let share = |wasted: u64, bytes: u64| 100.0 * wasted as f64 / bytes as f64;
         println!(
-            "| {link} | {} | {:.1} | {:.1} % | {:.1} | {:.1} % |",
-            with.cancelled,
-            with.bytes as f64 / 1e6,
-            share(with.wasted_bytes(), with.bytes),
-            without.bytes as f64 / 1e6,
-            share(without.wasted_bytes(), without.bytes),
+            "| {link} | {broken_off} | {:.1} | {:.1} % | {:.1} | {:.1} % |",
+            bytes as f64 / 1e6,
+            share(wasted, bytes),
+            all as f64 / 1e6,
+            share(without, all),
         );
     }
     Ok(())

@@ -55,7 +55,7 @@ impl Dragger {
         let (connection, screen) = RustConnection::connect(Some(display)).expect("the screen");
         let root = connection.setup().roots[screen].root;
         let atoms =
-            Atoms::new(&connection).and_then(|c| Ok(c.reply())).expect("the screen answers");
+            Atoms::new(&connection).map(|cookie| cookie.reply()).expect("the screen answers");
         let atoms = atoms.expect("names");
         let own = connection.generate_id().expect("a number");
         let aux = CreateWindowAux::new();
