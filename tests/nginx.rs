@@ -29,12 +29,20 @@ impl Nginx {
     /// # Errors
     /// Where it is not installed or does not come up.
     pub fn start(root: &Path) -> io::Result<Self> {
+        Self::start_on(root, None)
+    }
+
+    /// The same, on these processors alone (as `taskset` takes them), a worker for each.
+    ///
+    /// # Errors
+    /// As for [`start`](Self::start).
+    pub fn start_on(root: &Path, processors: Option<(&str, usize)>) -> io::Result<Self> {
         // Its workers may run as another user.
         fs::set_permissions(root, fs::Permissions::from_mode(0o755))?;
         // The port is free for a moment only: another program may take it meanwhile.
         let mut failure = io::Error::other("nginx was not tried");
         for _ in 0..10 {
-            match Self::try_start(root) {
+            match Self::try_start(root, processors) {
                 Err(e) if e.kind() != io::ErrorKind::NotFound => failure = e,
                 other => return other,
             }
@@ -61,13 +69,15 @@ impl Nginx {
         workers.split_whitespace().filter_map(|pid| pid.parse().ok()).chain([id]).collect()
     }
 
-    fn try_start(root: &Path) -> io::Result<Self> {
+    fn try_start(root: &Path, processors: Option<(&str, usize)>) -> io::Result<Self> {
         let prefix = tempfile::tempdir()?;
         fs::set_permissions(prefix.path(), fs::Permissions::from_mode(0o755))?;
         let addr = TcpListener::bind(("127.0.0.1", 0))?.local_addr()?;
         let folder = prefix.path().display();
+        // "auto" counts processors that it may not use.
+        let workers = processors.map_or("auto".into(), |(_, count)| count.to_string());
         let config = format!(
-            "daemon off; pid {folder}/pid; worker_processes auto; error_log stderr crit;\n\
+            "daemon off; pid {folder}/pid; worker_processes {workers}; error_log stderr crit;\n\
              events {{ worker_connections 16384; }}\n\
              http {{\n\
                  access_log off; sendfile on; tcp_nodelay on; default_type application/octet-stream;\n\
@@ -81,7 +91,15 @@ impl Nginx {
         );
         let file = prefix.path().join("nginx.conf");
         fs::write(&file, config)?;
-        let mut child = Command::new(program())
+        let mut command = match processors {
+            Some((list, _)) => {
+                let mut command = Command::new("taskset");
+                command.args(["-c", list, program()]);
+                command
+            }
+            None => Command::new(program()),
+        };
+        let mut child = command
             .args(["-p".as_ref(), prefix.path(), "-e".as_ref(), "stderr".as_ref(), "-c".as_ref()])
             .arg(&file)
             .stderr(Stdio::piped())

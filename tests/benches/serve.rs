@@ -2,7 +2,10 @@
 //!
 //! `./dev bench serve [INPUT] [--runs N]`. nginx runs with `sendfile`, `tcp_nodelay` and a worker for
 //! every core, without an access log; `wrk` asks both for ranges at random places of one file of 64 MiB,
-//! by turns, so that a drift of the machine's speed meets both. Then many nodes of 16 KiB by batches,
+//! by turns, so that a drift of the machine's speed meets both: first from processors of its own, then from the
+//! same ones, where the threads that are busy wait for each other (with few connections nginx has often all of
+//! them on one worker, so that fewer threads share the processors: its requests are slower then, its slowest
+//! faster). Then many nodes of 16 KiB by batches,
 //! beside nginx's by ranges, both asked by a load generator of this bench: wrk takes answers in pieces of 8
 //! KiB, which costs it more for a node than the server, and would be what is measured. At last, what
 //! batches are worth to the client's engine, on INPUT (a dataset or anything that `lodestream build` takes;
@@ -11,6 +14,7 @@
 use std::{
     cell::RefCell,
     error::Error,
+    ffi::OsStr,
     fs,
     io::{self, BufRead, BufReader},
     net::SocketAddr,
@@ -52,44 +56,22 @@ fn main() -> Result<()> {
     let Options { input, runs } = Options::parse(DEFAULT_INPUT)?;
     let folder = tempfile::tempdir()?;
     write_file(&folder.path().join("bench.lods"))?;
-    let ours = Server::start(folder.path())?;
-    let rival = Nginx::start(folder.path())?;
+    let processors = std::thread::available_parallelism()?.get();
     println!(
-        "{}, {} cores, medians of {runs} runs of {SECONDS} s by turns; ratios are ours to nginx's\n",
+        "{}, {processors} cores, medians of {runs} runs of {SECONDS} s by turns; ratios are ours to nginx's",
         Nginx::version()?,
-        std::thread::available_parallelism()?
     );
-
-    println!(
-        "| KiB | connections | requests/s | nginx | ratio | p99 ms | nginx | ratio | server's µs/request | nginx |"
-    );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    let (our_url, their_url) =
-        (format!("{}/bench.lods", ours.url), format!("http://{}/bench.lods", rival.addr));
-    let (our_pids, their_pids) = (vec![ours.child.id()], rival.pids());
-    for connections in CONNECTIONS {
-        for size in SIZES {
-            let script = folder.path().join("ranges.lua");
-            fs::write(&script, range_script(size))?;
-            let (us, them) = by_turns(
-                runs,
-                || load(&our_url, &script, connections, &our_pids),
-                || load(&their_url, &script, connections, &their_pids),
-            )?;
-            println!(
-                "| {} | {connections} | {:.0} | {:.0} | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} |",
-                size >> 10,
-                us.rate,
-                them.rate,
-                us.rate / them.rate,
-                us.p99_ms,
-                them.p99_ms,
-                us.p99_ms / them.p99_ms,
-                us.cpu_us,
-                them.cpu_us
-            );
-        }
+    if let Some((servers, generators)) = halves(processors) {
+        println!("\nServers on one half of the cores, wrk on the other:\n");
+        let ours = Server::start(folder.path(), Some(&servers.0))?;
+        let rival = Nginx::start_on(folder.path(), Some((&servers.0, servers.1)))?;
+        ranges(&ours, &rival, Some(&generators), runs)?;
     }
+    println!("\nServers and wrk on all cores, in each other's way:\n");
+    let ours = Server::start(folder.path(), None)?;
+    let rival = Nginx::start(folder.path())?;
+    ranges(&ours, &rival, None, runs)?;
+    let (our_pids, their_pids) = (vec![ours.child.id()], rival.pids());
 
     println!("\nNodes of 16 KiB, by batches of {NODES} beside nginx's by ranges:\n");
     println!("| connections | nodes/s | nginx | ratio | server's µs/node | nginx |");
@@ -139,6 +121,71 @@ fn main() -> Result<()> {
     Ok(())
 }
 
+/// Processors as `taskset` takes them, and how many.
+type Processors = (String, usize);
+
+/// Half of the processors for servers, the others for those who ask; `None` where there is one.
+fn halves(processors: usize) -> Option<(Processors, Processors)> {
+    let half = processors / 2;
+    (half > 0).then(|| {
+        let list = |from: usize, to: usize| (format!("{from}-{}", to - 1), to - from);
+        (list(0, half), list(half, processors))
+    })
+}
+
+/// Ranges of each size over few and many connections: the table.
+fn ranges(
+    ours: &Server,
+    rival: &Nginx,
+    generators: Option<&Processors>,
+    runs: usize,
+) -> Result<()> {
+    println!(
+        "| KiB | connections | requests/s | nginx | ratio | p99 ms | nginx | ratio | server's µs/request | nginx |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    let folder = tempfile::tempdir()?;
+    let (our_url, their_url) =
+        (format!("{}/bench.lods", ours.url), format!("http://{}/bench.lods", rival.addr));
+    let (our_pids, their_pids) = (vec![ours.child.id()], rival.pids());
+    for connections in CONNECTIONS {
+        for size in SIZES {
+            let script = folder.path().join("ranges.lua");
+            fs::write(&script, range_script(size))?;
+            let (us, them) = by_turns(
+                runs,
+                || load(&our_url, &script, connections, generators, &our_pids),
+                || load(&their_url, &script, connections, generators, &their_pids),
+            )?;
+            println!(
+                "| {} | {connections} | {:.0} | {:.0} | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} |",
+                size >> 10,
+                us.rate,
+                them.rate,
+                us.rate / them.rate,
+                us.p99_ms,
+                them.p99_ms,
+                us.p99_ms / them.p99_ms,
+                us.cpu_us,
+                them.cpu_us
+            );
+        }
+    }
+    Ok(())
+}
+
+/// A program, on these processors alone if so.
+fn on(processors: Option<&str>, program: impl AsRef<OsStr>) -> Command {
+    match processors {
+        Some(list) => {
+            let mut command = Command::new("taskset");
+            command.args(["-c", list]).arg(program);
+            command
+        }
+        None => Command::new(program),
+    }
+}
+
 /// Random bytes behind a sound header: all that a host looks at.
 fn write_file(path: &Path) -> Result<()> {
     let header = header();
@@ -173,8 +220,8 @@ struct Server {
 }
 
 impl Server {
-    fn start(folder: &Path) -> Result<Self> {
-        let mut command = Command::new(program("lodestream-server")?);
+    fn start(folder: &Path, processors: Option<&str>) -> Result<Self> {
+        let mut command = on(processors, program("lodestream-server")?);
         command.arg("serve").arg(folder).args(["--listen", "127.0.0.1:0"]);
         let mut child = command.stdout(Stdio::piped()).spawn()?;
         let mut url = String::new();
@@ -219,10 +266,23 @@ fn by_turns(
     Ok((middle(&us), middle(&them)))
 }
 
-fn load(url: &str, script: &Path, connections: u32, pids: &[u32]) -> Result<Load> {
+fn load(
+    url: &str,
+    script: &Path,
+    connections: u32,
+    processors: Option<&Processors>,
+    pids: &[u32],
+) -> Result<Load> {
     let before = ticks(pids);
-    let output = Command::new("wrk")
-        .args(["-t2", &format!("-c{connections}"), &format!("-d{SECONDS}s"), "--latency", "-s"])
+    let (list, threads) = processors.map_or((None, 2), |(list, count)| (Some(&**list), *count));
+    let output = on(list, "wrk")
+        .args([
+            &format!("-t{threads}"),
+            &format!("-c{connections}"),
+            &format!("-d{SECONDS}s"),
+            "--latency",
+            "-s",
+        ])
         .arg(script)
         .arg(url)
         .output()
