@@ -6,9 +6,10 @@
 //! same answer to the letter (a test holds them to it). Only this way can have the system send a file's
 //! pages themselves (`sendfile`), from a [private copy](crate::private_copy).
 //!
-//! The server's processor time for each request, µs, beside nginx 1.22 (`sendfile`, no access log), on two
-//! cores, 16 connections, ranges at any byte, by `./dev bench serve`: 12.8 (nginx 14.5) for 4 KiB, 23.6 (21.0) for
-//! 64 KiB, 44 (48.5) for 256 KiB, 224 (216) for 1 MiB. The long way took 13.5 for 4 KiB when this took 10.6.
+//! The server's processor time for each request, µs, beside nginx 1.22 (`sendfile`, no access log), on a
+//! core of its own, 16 connections, ranges at any byte, by `./dev bench serve`: 10.5 (nginx 13.4) for 4 KiB, 15.9
+//! (18.1) for 64 KiB, 37.6 (41.2) for 256 KiB, 193 (200) for 1 MiB. The long way took 13.5 for 4 KiB when this
+//! took 10.6.
 
 mod answer;
 mod head;
