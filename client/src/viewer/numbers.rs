@@ -47,10 +47,10 @@ fn three_digits(number: f64) -> String {
     format!("{number:.decimals$}")
 }
 
-/// A length with as many decimals as tell a millionth of it.
+/// A length with as many decimals as tell five digits of `whole`, of which it is a part or all.
 #[must_use]
-pub fn length(number: f64) -> String {
-    let magnitude = number.abs().max(1e-12).log10().floor();
+pub fn length(number: f64, whole: f64) -> String {
+    let magnitude = whole.abs().max(1e-12).log10().floor();
     let decimals = (4.0 - magnitude).clamp(0.0, 9.0) as usize;
     format!("{number:.decimals$}")
 }
@@ -84,8 +84,9 @@ mod tests {
         assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
         assert_eq!([7, 1_234, 99_960, 123_456_789].map(short), ["7", "1.23 k", "100 k", "123 M"]);
         assert_eq!(bytes(5_600_000), "5.60 MB");
-        assert_eq!(length(12.3456789), "12.346");
-        assert_eq!(length(0.00123456), "0.0012346");
+        assert_eq!(length(12.3456789, 12.3456789), "12.346");
+        assert_eq!(length(0.00123456, 0.00123456), "0.0012346");
+        assert_eq!(length(-0.0001, 1.6942), "-0.0001");
         assert_eq!([0.05, 500.0, 2.0].map(round_text), ["0.05", "500", "2"]);
     }
 

@@ -76,11 +76,14 @@ impl Screen {
         (width, height, pixels.collect())
     }
 
-    /// Writes what is on it.
+    /// Writes what is on it, without what is black to the right and below: where no window is.
     pub fn write(&self, path: &Path) {
         let (width, height, pixels) = self.picture();
-        let color = image::ExtendedColorType::Rgba8;
-        image::save_buffer(path, &pixels, width, height, color).expect("written");
+        let picture = image::RgbaImage::from_raw(width, height, pixels).expect("all pixels");
+        let shown = picture.enumerate_pixels().filter(|(_, _, pixel)| pixel.0[..3] != [0; 3]);
+        let (right, below) = shown.fold((0, 0), |(w, h), (x, y, _)| (w.max(x + 1), h.max(y + 1)));
+        let window = image::imageops::crop_imm(&picture, 0, 0, right.max(1), below.max(1));
+        window.to_image().save(path).expect("written");
     }
 
     /// Moves hands: arguments of xdotool.

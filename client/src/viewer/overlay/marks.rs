@@ -50,8 +50,8 @@ fn draw_measurement(
     }
     let label = format!(
         "{}   height {}",
-        numbers::length(measurement.distance()),
-        numbers::length(measurement.height())
+        numbers::length(measurement.distance(), measurement.distance()),
+        numbers::length(measurement.height(), measurement.distance())
     );
     let at = line[0].lerp(line[1], 0.5) - vec2(0.0, 12.0);
     super::text(painter, at, Align2::CENTER_BOTTOM, &label, 13.0, palette);

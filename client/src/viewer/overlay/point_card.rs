@@ -80,11 +80,12 @@ fn show_measured(viewer: &mut Viewer, ui: &mut Ui, palette: Palette) {
     let mut removed = None;
     for (index, measurement) in viewer.measurements.iter().enumerate() {
         ui.horizontal(|ui| {
-            let distance = numbers::length(measurement.distance());
+            let whole = measurement.distance();
+            let distance = numbers::length(whole, whole);
             let more = format!(
                 "height {}, across {}",
-                numbers::length(measurement.height()),
-                numbers::length(measurement.horizontal())
+                numbers::length(measurement.height(), whole),
+                numbers::length(measurement.horizontal(), whole)
             );
             ui.label(RichText::new(distance).color(palette.warning));
             ui.label(RichText::new(more).color(palette.faint).small());

@@ -66,11 +66,13 @@ fn top_bar(viewer: &mut Viewer, ui: &mut Ui) {
                 "Open a dataset, a server's list or a session (Ctrl O)",
                 Action::Open,
             );
-            button(ui, "Save", "Save the session (Ctrl S)", Action::Save);
-            button(ui, "Picture", "Write the picture as PNG (F12)", Action::Picture);
-            ui.separator();
-            button(ui, "Fit", "Show all (F)", Action::Fit);
             // What does not fit is left to its keys.
+            if ui.available_width() > 360.0 {
+                button(ui, "Save", "Save the session (Ctrl S)", Action::Save);
+                button(ui, "Picture", "Write the picture as PNG (F12)", Action::Picture);
+                ui.separator();
+            }
+            button(ui, "Fit", "Show all (F)", Action::Fit);
             let room = ui.available_width();
             if room > 780.0 {
                 for (index, (side, name)) in Side::ALL.into_iter().enumerate() {
@@ -174,7 +176,10 @@ fn status_bar(viewer: &Viewer, ui: &mut Ui) {
                 ui.label(RichText::new(text).color(palette.warning));
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.label(RichText::new(&viewer.renderer).color(palette.faint).small());
+                let name = RichText::new(&viewer.renderer).color(palette.faint).small();
+                if ui.available_width() > 60.0 {
+                    ui.add(egui::Label::new(name).truncate());
+                }
             });
         });
     });
