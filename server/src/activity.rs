@@ -5,11 +5,9 @@
 //! to that; here many streams share one of each, so that what the streams do is looked at.
 
 use std::{
+    collections::HashMap,
     pin::Pin,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicUsize, Ordering},
-    },
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     task::{Context, Poll, ready},
 };
 
@@ -22,35 +20,47 @@ use crate::connection::ConnectionLimits;
 
 /// What the streams of a connection do.
 #[derive(Debug)]
-pub(crate) struct Activity {
+pub(crate) struct Activity(Mutex<Streams>);
+
+#[derive(Debug)]
+struct Streams {
     /// Requests whose responses have not begun: the server's own affair.
-    handled: AtomicUsize,
-    /// Responses that are not sent whole.
-    open: AtomicUsize,
-    /// When a stream last did something.
-    last: Mutex<Instant>,
+    handled: usize,
+    /// When something was last taken of each response that is not sent whole.
+    open: HashMap<u64, Instant>,
+    /// The next of these.
+    next: u64,
+    /// When a request was last begun or ended.
+    last: Instant,
 }
 
 impl Activity {
     pub(crate) fn new() -> Arc<Self> {
-        let last = Mutex::new(Instant::now());
-        Arc::new(Self { handled: AtomicUsize::new(0), open: AtomicUsize::new(0), last })
+        let (open, last) = (HashMap::new(), Instant::now());
+        Arc::new(Self(Mutex::new(Streams { handled: 0, open, next: 0, last })))
     }
 
     /// A request has come.
     pub(crate) fn begin(self: &Arc<Self>) -> Handling {
-        self.handled.fetch_add(1, Ordering::Relaxed);
+        let mut streams = self.streams();
+        streams.handled += 1;
+        streams.last = Instant::now();
         Handling(Arc::clone(self))
     }
 
-    /// Returns once nothing was asked for, or nothing taken of what was, for longer than is allowed.
+    /// Returns once nothing was asked for, or of a response nothing taken, for longer than is allowed.
     pub(crate) async fn end(&self, limits: ConnectionLimits) {
         loop {
             let now = Instant::now();
-            let is_handling = self.handled.load(Ordering::Relaxed) > 0;
-            let is_open = self.open.load(Ordering::Relaxed) > 0;
-            let since = if is_handling { now } else { self.last() };
-            let due = since + if is_open { limits.write_timeout } else { limits.head_timeout };
+            let due = {
+                let streams = self.streams();
+                match streams.open.values().min() {
+                    // Whatever the others do.
+                    Some(stalled) => *stalled + limits.write_timeout,
+                    None if streams.handled > 0 => now + limits.head_timeout,
+                    None => streams.last + limits.head_timeout,
+                }
+            };
             if due <= now {
                 return;
             }
@@ -58,12 +68,9 @@ impl Activity {
         }
     }
 
-    fn note(&self) {
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
-    }
-
-    fn last(&self) -> Instant {
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Counts stay whole whoever panics.
+    fn streams(&self) -> MutexGuard<'_, Streams> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -74,16 +81,23 @@ pub(crate) struct Handling(Arc<Activity>);
 impl Handling {
     /// The response, whose body is looked at from here on.
     pub(crate) fn watch(self, response: Response) -> Response {
-        self.0.open.fetch_add(1, Ordering::Relaxed);
         let activity = Arc::clone(&self.0);
-        response.map(|body| Body::new(Watched { body, rest: Bytes::new(), activity }))
+        let number = {
+            let mut streams = activity.streams();
+            streams.next += 1;
+            let number = streams.next;
+            streams.open.insert(number, Instant::now());
+            number
+        };
+        response.map(|body| Body::new(Watched { body, rest: Bytes::new(), activity, number }))
     }
 }
 
 impl Drop for Handling {
     fn drop(&mut self) {
-        self.0.note();
-        self.0.handled.fetch_sub(1, Ordering::Relaxed);
+        let mut streams = self.0.streams();
+        streams.handled -= 1;
+        streams.last = Instant::now();
     }
 }
 
@@ -97,6 +111,7 @@ struct Watched {
     /// Of a frame that is longer than a step.
     rest: Bytes,
     activity: Arc<Activity>,
+    number: u64,
 }
 
 impl HttpBody for Watched {
@@ -107,7 +122,7 @@ impl HttpBody for Watched {
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        self.activity.note();
+        self.activity.streams().open.insert(self.number, Instant::now());
         if self.rest.is_empty() {
             match ready!(Pin::new(&mut self.body).poll_frame(context)) {
                 Some(Ok(frame)) => match frame.into_data() {
@@ -138,7 +153,8 @@ impl HttpBody for Watched {
 
 impl Drop for Watched {
     fn drop(&mut self) {
-        self.activity.note();
-        self.activity.open.fetch_sub(1, Ordering::Relaxed);
+        let mut streams = self.activity.streams();
+        streams.open.remove(&self.number);
+        streams.last = Instant::now();
     }
 }

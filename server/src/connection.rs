@@ -32,6 +32,8 @@ use crate::{activity::Activity, config::ServeConfig, hot, peer::Peer, routes::Si
 /// Most bytes of a request's head, and of a response waiting for the client besides the piece that
 /// was read last.
 const MAX_QUEUED_BYTES: usize = 64 << 10;
+/// Most requests at a time of a connection of HTTP/2; each holds a buffer.
+const MAX_STREAMS: u32 = 32;
 /// What a client says first that speaks HTTP/2 without having agreed on it (RFC 9113, section 3.4).
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
@@ -40,11 +42,16 @@ const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 pub(crate) struct ConnectionLimits {
     pub(crate) head_timeout: Duration,
     pub(crate) write_timeout: Duration,
+    pub(crate) response_timeout: Duration,
 }
 
 impl From<&ServeConfig> for ConnectionLimits {
     fn from(config: &ServeConfig) -> Self {
-        Self { head_timeout: config.head_timeout, write_timeout: config.write_timeout }
+        Self {
+            head_timeout: config.head_timeout,
+            write_timeout: config.write_timeout,
+            response_timeout: config.response_timeout,
+        }
     }
 }
 
@@ -139,6 +146,7 @@ where
         builder
             .timer(TokioTimer::new())
             .max_header_list_size(MAX_QUEUED_BYTES as u32)
+            .max_concurrent_streams(MAX_STREAMS)
             .keep_alive_interval(Some(limits.head_timeout))
             .keep_alive_timeout(limits.write_timeout);
         let activity = Activity::new();

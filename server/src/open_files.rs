@@ -43,22 +43,21 @@ impl OpenFiles {
         }
         let opened = identity.and_then(|_| DatasetFile::open(path.clone()));
         let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
-        match opened {
+        // What is let go of is closed after the lock: a private copy takes its time.
+        let (found, _former, _other) = match opened {
             Ok((identity, file)) => {
                 let file = Arc::new(file);
-                if files.len() >= MAX_OPEN && !files.contains_key(&path) {
-                    // Any of them: whoever has this many datasets in use opens them as before.
-                    let any = files.keys().next().cloned();
-                    any.and_then(|any| files.remove(&any));
-                }
-                files.insert(path, (identity, Arc::clone(&file)));
-                Ok(file)
+                let is_full = files.len() >= MAX_OPEN && !files.contains_key(&path);
+                // Any of them: whoever has this many datasets in use opens them as before.
+                let any = is_full.then(|| files.keys().next().cloned()).flatten();
+                let other = any.and_then(|any| files.remove(&any));
+                let former = files.insert(path, (identity, Arc::clone(&file)));
+                (Ok(file), former, other)
             }
-            Err(error) => {
-                files.remove(&path);
-                Err(error)
-            }
-        }
+            Err(error) => (Err(error), files.remove(&path), None),
+        };
+        drop(files);
+        found
     }
 
     /// Closes files whose path leads elsewhere by now (blocking).
@@ -70,9 +69,10 @@ impl OpenFiles {
         for (path, identity) in known {
             if identity_of(&path).as_ref() != Ok(&identity) {
                 let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
-                if files.get(&path).is_some_and(|(now, _)| *now == identity) {
-                    files.remove(&path);
-                }
+                let is_known = files.get(&path).is_some_and(|(now, _)| *now == identity);
+                let former = is_known.then(|| files.remove(&path));
+                drop(files);
+                drop(former);
             }
         }
     }

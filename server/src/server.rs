@@ -24,6 +24,9 @@ use crate::{
     workers::Workers,
 };
 
+/// For connections that were cut off to end.
+const LAST_WAIT: Duration = Duration::from_secs(1);
+
 /// How often certificate and key are looked at.
 const CERTIFICATE_CHECK: Duration = Duration::from_secs(30);
 
@@ -158,7 +161,8 @@ impl Server {
         if tokio::time::timeout(self.config.drain_timeout, drained).await.is_err() {
             tracing::warn!("{} connections cut off at shutdown", connections.len());
         }
-        connections.shutdown().await;
+        // What is stuck in a call of the system cannot be ended.
+        let _ = tokio::time::timeout(LAST_WAIT, connections.shutdown()).await;
         sweeping.abort();
     }
 

@@ -1,7 +1,8 @@
 //! What a dataset in an object store costs beside one on the local disk: milliseconds for ranges, first and again.
 //!
-//! `./dev bench storage [RANGES]`. The object store is a program on this machine (moto, in Python), so that what it
-//! takes itself is in the figures: they are an upper bound of the server's own cost, and real stores add their distance.
+//! `./dev bench storage`. One range from each mebibyte of a file, so that no block was read before it is asked for; then
+//! the same again. The object store is a program on this machine (moto, in Python), so that what it takes itself is in
+//! the figures: they are an upper bound of the server's own cost, and real stores add their distance.
 
 #[path = "../tests/hosting/process.rs"]
 #[allow(dead_code, reason = "tests use more of it")]
@@ -20,17 +21,22 @@ use reqwest::Client;
 
 const RANGE_BYTES: u64 = 64 << 10;
 
+/// From one range to the next.
+const STEP_BYTES: u64 = 1 << 20;
+
+/// Ranges are asked for in steps of so many, modulo their number: a prime, so that all of them are.
+const STRIDE: u64 = 61;
+
 fn main() {
-    let ranges: u64 = std::env::args().skip(1).find_map(|a| a.parse().ok()).unwrap_or(200);
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
-    runtime.expect("a runtime").block_on(measure(ranges));
+    runtime.expect("a runtime").block_on(measure());
 }
 
-async fn measure(ranges: u64) {
+async fn measure() {
     let _ = rustls::crypto::ring::default_provider().install_default();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("a.lods");
-    server::build(&path, "2M", 1);
+    server::build(&path, "16M", 1);
     let bytes = std::fs::read(&path).expect("built");
     let s3 = s3::S3::start().await;
     s3.put("a.lods", bytes.clone()).await;
@@ -44,8 +50,8 @@ async fn measure(ranges: u64) {
     println!("| --- | --- | --- |");
     let mut medians = Vec::new();
     for (name, url) in [("local disk", &disk), ("object store", &store)] {
-        let first = ask(url, ranges, &bytes).await;
-        let again = ask(url, ranges, &bytes).await;
+        let first = ask(url, &bytes).await;
+        let again = ask(url, &bytes).await;
         let told = |times: &[f64]| {
             format!("{:.2}, {:.2} ms", median(times), times[times.len() * 99 / 100])
         };
@@ -72,14 +78,16 @@ fn median(sorted: &[f64]) -> f64 {
 }
 
 /// Milliseconds of each range, sorted.
-async fn ask(url: &str, ranges: u64, bytes: &[u8]) -> Vec<f64> {
+async fn ask(url: &str, bytes: &[u8]) -> Vec<f64> {
     let client = Client::new();
-    let mut state = 1u64;
+    // The connection stands before anything is timed.
+    client.head(format!("{url}/a.lods")).send().await.expect("an answer");
     let mut times = Vec::new();
-    for _ in 0..ranges {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let start = (state >> 20) % (bytes.len() as u64 - RANGE_BYTES);
+    let count = bytes.len() as u64 / STEP_BYTES;
+    assert!(!count.is_multiple_of(STRIDE), "{count} steps: another prime is needed");
+    for index in 0..count {
+        // Not in the order of the file: nothing may be read ahead.
+        let start = index * STRIDE % count * STEP_BYTES + STEP_BYTES / 3;
         let range = format!("bytes={start}-{}", start + RANGE_BYTES - 1);
         let began = Instant::now();
         let response = client.get(format!("{url}/a.lods")).header("range", range).send().await;

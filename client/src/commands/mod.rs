@@ -10,14 +10,60 @@ pub mod shot;
 pub mod stability;
 pub mod view;
 
-/// The command line that was given.
+/// The command line that was given, without what is secret: reports are made to be shown around.
 fn command_line() -> String {
+    quoted_line(std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()))
+}
+
+/// Options whose value is a secret.
+const SECRET: &str = "--token";
+
+fn quoted_line(arguments: impl Iterator<Item = String>) -> String {
     let quoted = |argument: String| {
-        let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=%".contains(c);
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=%…".contains(c);
         let is_plain = !argument.is_empty() && argument.chars().all(plain);
         if is_plain { argument } else { format!("'{}'", argument.replace('\'', r"'\''")) }
     };
-    let arguments = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned()));
-    let arguments: Vec<_> = arguments.collect();
+    let mut is_secret = false;
+    let shown = |argument: String| {
+        if std::mem::replace(&mut is_secret, argument == SECRET) {
+            return "…".to_owned();
+        }
+        if argument.strip_prefix(SECRET).is_some_and(|rest| rest.starts_with('=')) {
+            return format!("{SECRET}=…");
+        }
+        // A signature or a password in an address opens what it names.
+        match argument.split_once("://") {
+            Some((scheme, rest)) => {
+                let rest = rest.split(['?', '#']).next().unwrap_or(rest);
+                let host = rest.split('/').next().unwrap_or(rest);
+                let at = host.rfind('@').map_or(0, |at| at + 1);
+                format!("{scheme}://{}", &rest[at..])
+            }
+            None if argument.contains("signature=") => {
+                argument.split('?').next().unwrap_or_default().to_owned()
+            }
+            None => argument,
+        }
+    };
+    let arguments: Vec<_> = arguments.map(shown).map(quoted).collect();
     format!("lodestream {}", arguments.join(" "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn command_lines_are_told_without_secrets() {
+        let line = |arguments: &[&str]| quoted_line(arguments.iter().map(|a| (*a).to_owned()));
+        let given =
+            ["load", "--token", "hush", "https://me:hush@host:1/a?signature=hush", "-o", "d e"];
+        assert_eq!(line(&given), "lodestream load --token … https://host:1/a -o 'd e'");
+        assert_eq!(
+            line(&["load", "--token=hush", "host/a?x=1&signature=hush"]),
+            "lodestream load --token=… host/a"
+        );
+        assert_eq!(line(&["eval", "sim:a?points=5"]), "lodestream eval 'sim:a?points=5'");
+    }
 }

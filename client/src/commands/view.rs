@@ -105,7 +105,8 @@ pub struct LookArgs {
 
 impl LookArgs {
     /// The look, with what is given in it.
-    fn upon(&self, look: Look) -> Look {
+    #[must_use]
+    pub fn upon(&self, look: Look) -> Look {
         let shading = self.shading;
         Look {
             splat: self.splat.unwrap_or(look.splat),
@@ -141,7 +142,6 @@ fn options(args: ViewArgs) -> anyhow::Result<ViewOptions> {
         settings_file.as_deref().map(Settings::open).unwrap_or_default();
     let look = args.look.upon(settings.look);
     look.check()?;
-    let look_given = look != settings.look;
     settings.look = look;
     settings.theme = args.look.theme.unwrap_or(settings.theme);
     settings.window = args.size.unwrap_or(settings.window);
@@ -157,13 +157,14 @@ fn options(args: ViewArgs) -> anyhow::Result<ViewOptions> {
         settings,
         settings_file,
         settings_trouble,
-        look: look_given.then_some(look),
-        budget_given: args.budget.is_some() || args.min_node.is_some(),
+        point_budget: args.budget,
+        min_node_px: args.min_node,
         camera,
         clip: args.clip,
         path,
         renderer: args.renderer,
         gpu_path: args.look.gpu_path,
+        look: args.look,
         folder: args.folder,
         events: args.events,
     };

@@ -62,7 +62,8 @@ impl Policy {
         match self {
             Self::Ours => config,
             Self::Potree | Self::PotreeBrotli => {
-                EngineConfig { requests_in_flight: 4, min_size_px: 30.0, ..apart }
+                let priority = Priority::Size;
+                EngineConfig { requests_in_flight: 4, min_size_px: 30.0, priority, ..apart }
             }
             Self::Fraiss => EngineConfig {
                 requests_in_flight: 1,

@@ -52,6 +52,8 @@ pub enum Priority {
     ErrorPerByte,
     /// The largest, and those in the middle of the picture. (Fraiss 2017, eqs. 3.2-3.4)
     Fraiss,
+    /// The largest, and first of all those around the eye, as Potree has it.
+    Size,
 }
 
 /// What a node is about to change.
@@ -74,7 +76,7 @@ impl Priority {
                 let middle = optics.priority(bounds.center, 1.0); // Fraiss 2017, eq. 3.4
                 priority * middle.powi(MIDDLE)
             }
-            Self::Fraiss => priority,
+            Self::Fraiss | Self::Size => priority,
         }
     }
 
@@ -92,6 +94,7 @@ impl Priority {
                 let size = optics.projected_size(bounds.center, bounds.radius());
                 optics.priority(bounds.center, size)
             }
+            Self::Size => optics.projected_size(bounds.center, bounds.radius()),
         }
     }
 }
@@ -140,7 +143,7 @@ mod tests {
         ) {
             let bounds = WorldBox { center: center.into(), half: half.into() };
             let change = Change { error_before, error_after, bytes };
-            for priority in [Priority::ErrorPerByte, Priority::Fraiss] {
+            for priority in [Priority::ErrorPerByte, Priority::Fraiss, Priority::Size] {
                 prop_assert!(priority.of(&optics(), &bounds, change) >= 0.0);
             }
         }

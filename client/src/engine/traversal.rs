@@ -216,9 +216,14 @@ impl Traversal {
                     self.remove(number);
                     reselect = true;
                 }
+                // Removed while it was being replaced: the version that comes is none any more, either.
+                Event::Replaced { cloud, by, .. } if self.clouds[cloud].gone => {
+                    self.clouds.resize(self.clouds.len().max(by + 1), Cloud::default());
+                    self.trees.resize_with(self.clouds.len(), || None);
+                    self.clouds[by].gone = true;
+                }
                 // The loader tells on for a while of clouds that were removed.
                 Event::Opened { cloud, .. }
-                | Event::Replaced { cloud, .. }
                 | Event::CloudFailed { cloud, .. }
                 | Event::CloudIsBack { cloud }
                 | Event::Group { node: NodeId { cloud, .. }, .. }

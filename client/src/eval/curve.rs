@@ -30,10 +30,11 @@ pub struct Reached {
     pub bytes: u64,
 }
 
-/// When the similarity first is at least `level` for the rest of the run; `None` where it never is.
+/// When the similarity first is at least `level` for the rest of the run; `None` where it never is. What shows
+/// nothing is right nowhere, however much background there is.
 #[must_use]
 pub fn reached(samples: &[Sample], level: f64) -> Option<Reached> {
-    let last_below = samples.iter().rposition(|sample| sample.ssim < level);
+    let last_below = samples.iter().rposition(|s| s.ssim < level || s.points == 0);
     let first = samples.get(last_below.map_or(0, |last| last + 1))?;
     Some(Reached { ms: first.ms, bytes: first.bytes })
 }
@@ -109,7 +110,7 @@ mod tests {
             bytes,
             ssim,
             requests: 0,
-            points: 0,
+            points: 1,
             mse: 0.0,
             holes: 0.0,
         };
@@ -123,6 +124,9 @@ mod tests {
         assert_eq!(reached(&run, 0.05).map(|r| r.ms), Some(0.0));
         assert_eq!(reached(&run, 0.97), None);
         assert_eq!(reached(&[], 0.5), None);
+        let mut nothing = run;
+        nothing[0].points = 0;
+        assert_eq!(reached(&nothing, 0.05).map(|r| r.ms), Some(50.0), "nothing is not right");
     }
 
     #[test]

@@ -24,15 +24,17 @@ const WINDOW_BITS: i32 = 22;
 /// Bits of half a position, interleaved: 16 of each axis.
 const HALF_BITS: u32 = 48;
 
-/// Bytes of each node, by where its first group begins in the file.
+/// Bytes of each node, by where its first group begins in the file; with the attributes of these groups alone.
 ///
 /// # Errors
 /// Where the dataset cannot be read.
-pub fn node_bytes<R: ReadAt + Sync>(dataset: &Dataset<R>) -> anyhow::Result<HashMap<u64, u64>> {
+pub fn node_bytes<R: ReadAt + Sync>(
+    dataset: &Dataset<R>,
+    groups: &[usize],
+) -> anyhow::Result<HashMap<u64, u64>> {
     let manifest = dataset.manifest();
-    let groups: Vec<usize> = (0..manifest.groups.len()).collect();
     let encode = |node: &lodestream_protocol::Node| {
-        let points = dataset.read_node(node, &groups)?;
+        let points = dataset.read_node(node, groups)?;
         let bytes = compressed(&columns(manifest, &points))?;
         Ok(node.payloads.first().map(|payload| (payload.offset, bytes)))
     };

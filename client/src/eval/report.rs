@@ -46,6 +46,9 @@ pub struct SubjectReport {
     /// Of all nodes in the encoding of PotreeConverter 2 (BROTLI), where they were weighed.
     #[serde(default)]
     pub potree_bytes: Option<u64>,
+    /// The same with the attributes that are shown alone.
+    #[serde(default)]
+    pub potree_shown_bytes: Option<u64>,
     /// How it was built, where that was part of it.
     pub build: Option<BuildRow>,
     /// View by view.

@@ -22,6 +22,7 @@ use super::{
     views::ViewSize,
 };
 use crate::{
+    camera::Camera,
     engine::{EngineConfig, Policy},
     interrupt::go_on,
     metrics::{PictureError, ssim_map},
@@ -109,7 +110,10 @@ pub fn run(
             subject.name = unique(&subject.name, opened.iter().map(|(other, _)| &*other.name));
             let folder = tempfile::tempdir_in(scratch.path());
             let folder = folder.context("cannot make a temporary folder")?.keep();
-            subject.prepare_rivals(&folder, &config.policies)?;
+            // What is fetched hangs on the look, not on the view.
+            let camera = Camera::overview(subject.bounds[0], subject.bounds[1], 1.0);
+            let shown = RenderSettings::new(config.size_px, camera).groups(subject.manifest());
+            subject.prepare_rivals(&folder, &config.policies, &shown)?;
             opened.push((subject, build));
         }
     }
@@ -388,6 +392,7 @@ fn evaluate(
         points: subject.manifest().points,
         bytes: std::fs::metadata(&subject.path).map_or(0, |file| file.len()),
         potree_bytes: subject.potree_bytes(),
+        potree_shown_bytes: subject.potree_shown_bytes(),
         build,
         noise,
         frames,

@@ -38,6 +38,8 @@ pub struct Subject {
     whole: Option<PathBuf>,
     /// What nodes weigh in Potree's encoding, by where they begin in that file.
     potree: Option<Arc<HashMap<u64, u64>>>,
+    /// What all of them would weigh with the attributes that are shown alone.
+    potree_shown: Option<u64>,
     dataset: Dataset<PositionedFile>,
     /// The nodes that hold every point once.
     nodes: Vec<Node>,
@@ -72,6 +74,7 @@ impl Subject {
             name: name.unwrap_or_default(),
             whole: None,
             potree: None,
+            potree_shown: None,
             path: path.to_owned(),
             clouds: vec![manifest],
             bounds: [bounds.0.into(), bounds.1.into()],
@@ -89,11 +92,16 @@ impl Subject {
 
     /// Prepares for the rivals' policies: they know no positions in two parts, and fetch of every node a
     /// range that holds all of it. So they fetch from a twin, which is written to `folder`. For one of them
-    /// the nodes are weighed in its own encoding.
+    /// the nodes are weighed in its own encoding; `shown` are the groups that the picture needs.
     ///
     /// # Errors
     /// Where the twin cannot be written or read.
-    pub fn prepare_rivals(&mut self, folder: &Path, policies: &[Policy]) -> anyhow::Result<()> {
+    pub fn prepare_rivals(
+        &mut self,
+        folder: &Path,
+        policies: &[Policy],
+        shown: &[usize],
+    ) -> anyhow::Result<()> {
         if self.manifest().fine.is_some() && policies.iter().any(|p| *p != Policy::Ours) {
             let path = folder.join(format!("{}.lods", self.name));
             with_whole_positions(&self.dataset, &path)?;
@@ -102,7 +110,9 @@ impl Subject {
         if policies.contains(&Policy::PotreeBrotli) {
             let path = self.whole.as_ref().unwrap_or(&self.path);
             let dataset = Dataset::open(PositionedFile::open(path)?)?;
-            self.potree = Some(Arc::new(potree::node_bytes(&dataset)?));
+            let all: Vec<usize> = (0..dataset.manifest().groups.len()).collect();
+            self.potree = Some(Arc::new(potree::node_bytes(&dataset, &all)?));
+            self.potree_shown = Some(potree::node_bytes(&dataset, shown)?.values().sum());
         }
         Ok(())
     }
@@ -111,6 +121,12 @@ impl Subject {
     #[must_use]
     pub fn potree_bytes(&self) -> Option<u64> {
         self.potree.as_ref().map(|nodes| nodes.values().sum())
+    }
+
+    /// The same of files that were made without the attributes that are not shown.
+    #[must_use]
+    pub fn potree_shown_bytes(&self) -> Option<u64> {
+        self.potree_shown
     }
 
     /// An engine that fetches the dataset by such a link and policy, in simulated time.

@@ -551,7 +551,7 @@ fn innermost(error: &reqwest::Error) -> String {
     cause.to_string()
 }
 
-fn without_secrets(url: &Url) -> String {
+pub(super) fn without_secrets(url: &Url) -> String {
     let mut shown = url.clone();
     shown.set_query(None);
     // Neither can fail for http URLs; if it did, the URL holds no credentials.

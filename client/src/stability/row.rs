@@ -60,8 +60,8 @@ impl Row {
             reason,
             reference,
             naive: Vec::new(),
-            // False for NaN.
-            passed: error <= tolerance,
+            // A tolerance may be without bound where a condition is; an error may not.
+            passed: error.is_finite() && error <= tolerance,
         }
     }
 
@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn no_number_passes_nowhere() {
         let row = |error| Row::new("case", (error, "m"), (f64::INFINITY, "any"), "none");
-        assert!(row(1e300).passed && !row(f64::NAN).passed);
+        assert!(row(1e300).passed && !row(f64::NAN).passed && !row(f64::INFINITY).passed);
     }
 
     #[test]

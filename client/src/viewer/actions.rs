@@ -123,10 +123,11 @@ pub const SHORTCUTS: [Shortcut; 27] = [
 ];
 
 /// What hands do besides, for the help.
-pub const GESTURES: [(&str, &str); 9] = [
+pub const GESTURES: [(&str, &str); 10] = [
     ("Drag", "Turn (when flying: look around)"),
     ("Right or middle drag", "Move along the picture"),
     ("Wheel, pinch", "Nearer to what is under the cursor"),
+    ("Ctrl C", "Copy the picked point"),
     ("Shift + wheel", "Move along the picture (touchpads)"),
     ("Click", "Pick the point; when measuring, one of two"),
     ("Double click", "Turn around this point"),
@@ -209,11 +210,17 @@ impl Viewer {
                     self.recorder = Some(Recorder::start(&self.camera, Instant::now()));
                 }
             },
-            Action::Play => match (self.player.is_some(), self.path.clone()) {
-                (true, _) => self.take_over(),
-                (false, Some(path)) => self.play(path),
-                (false, None) => self.warn("There is no camera path: record one (R), or open one"),
-            },
+            Action::Play => {
+                // What was recorded is what is played.
+                self.stop_recording();
+                match (self.player.is_some(), self.path.clone()) {
+                    (true, _) => self.take_over(),
+                    (false, Some(path)) => self.play(path),
+                    (false, None) => {
+                        self.warn("There is no camera path: record one (R), or open one");
+                    }
+                }
+            }
             Action::Picture => self.wants_picture = true,
             Action::Open => self.open_dialog.is_open ^= true,
             Action::Save => {
@@ -237,7 +244,9 @@ impl Viewer {
     fn cancel(&mut self) {
         if self.shows_help || (self.open_dialog.is_open && !self.clouds.is_empty()) {
             (self.shows_help, self.open_dialog.is_open) = (false, false);
-        } else if self.player.is_some() || self.export.is_some() {
+        } else if self.export.is_some() {
+            self.end_export();
+        } else if self.player.is_some() {
             self.take_over();
         } else if self.recorder.is_some() {
             self.stop_recording();
@@ -299,9 +308,10 @@ impl Viewer {
         }
     }
 
-    /// Copies the picked point, or the last measurement when measuring.
+    /// Copies the picked point, or the measurement that it ends.
     pub fn copy(&mut self, context: &egui::Context) {
-        let measured = self.measurements.last().filter(|_| self.tool != Tool::Pick);
+        let ends = self.picked.as_ref().is_none_or(|pick| pick.ends_measurement);
+        let measured = self.measurements.last().filter(|_| ends && self.tool != Tool::Pick);
         let text = match (measured, &self.picked) {
             (Some(m), _) => {
                 let [from, to] = [m.from, m.to].map(|p| format!("{} {} {}", p[0], p[1], p[2]));
@@ -310,6 +320,11 @@ impl Viewer {
             (None, Some(pick)) => pick.point.text.join(" "),
             (None, None) => return,
         };
+        self.copy_text(text, context);
+    }
+
+    /// Copies a text, and says so.
+    pub fn copy_text(&mut self, text: String, context: &egui::Context) {
         self.events.tell("copied", json!({ "text": text }));
         self.note(format!("Copied {text}"));
         context.copy_text(text);
@@ -319,7 +334,7 @@ impl Viewer {
     pub fn save_path(&mut self) {
         let Some(path) = &self.path else { return };
         let file = PathBuf::from(self.fields.path.trim());
-        match path.write(&file) {
+        match super::stored::write_text(&file, &path.to_json()) {
             Ok(()) => self.note(format!("Saved {}", file.display())),
             Err(error) => self.warn(error.to_string()),
         }
@@ -333,11 +348,12 @@ impl Viewer {
 
     /// Begins to export the path as pictures.
     pub fn start_export(&mut self) {
+        self.stop_recording();
         let Some(path) = &self.path else { return };
         let folder = PathBuf::from(self.fields.export.trim());
         match Export::start(path, &folder, self.fields.export_frames) {
             Ok(export) => {
-                (self.player, self.recorder) = (None, None);
+                self.player = None;
                 self.export = Some(export);
             }
             Err(error) => self.warn(error),

@@ -36,6 +36,9 @@ const UPLOAD_BYTES_PER_FRAME: u64 = 24 << 20;
 /// The longest step of what moves by itself: after a pause it goes on where it was.
 const LONGEST_STEP: f64 = 0.1;
 
+/// Seconds between two frames, as most screens have it.
+const USUAL_STEP: f64 = 1.0 / 60.0;
+
 /// Failures of the GPU in a row that are taken for accidents.
 const MOST_FAILURES: u32 = 3;
 
@@ -187,7 +190,9 @@ impl App {
             return;
         }
         let now = Instant::now();
-        let seconds = (now - self.last_frame).as_secs_f64().min(LONGEST_STEP);
+        // After a rest nothing was drawn for long: what begins now begins with a step of a usual frame.
+        let longest = if self.viewer.navigator.is_settled() { USUAL_STEP } else { LONGEST_STEP };
+        let seconds = (now - self.last_frame).as_secs_f64().min(longest);
         self.last_frame = now;
         if std::mem::take(&mut self.has_news) {
             self.viewer.take_news();

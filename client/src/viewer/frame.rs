@@ -231,10 +231,15 @@ impl Viewer {
         Ok(())
     }
 
-    /// The first name that is free.
-    fn next_picture_file(&self) -> std::path::PathBuf {
-        let name = |number: u32| self.folder.join(format!("lodestream-{number:04}.png"));
-        (1..100_000).map(name).find(|file| !file.exists()).unwrap_or_else(|| name(0))
+    /// The first name that is free; each is given once, for its file comes later.
+    fn next_picture_file(&mut self) -> std::path::PathBuf {
+        loop {
+            self.last_picture += 1;
+            let file = self.folder.join(format!("lodestream-{:04}.png", self.last_picture));
+            if !file.exists() {
+                return file;
+            }
+        }
     }
 }
 

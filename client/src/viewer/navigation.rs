@@ -248,6 +248,11 @@ impl Navigator {
         self.is_chosen
     }
 
+    /// As if nobody had chosen a view.
+    pub fn forget_choice(&mut self) {
+        self.is_chosen = false;
+    }
+
     /// World units that are flown in a second.
     #[must_use]
     pub fn speed(&self) -> f64 {

@@ -78,7 +78,6 @@ impl Viewer {
             Choice::Several(sources) => sources.iter().for_each(|source| self.open(source)),
             Choice::List(server) => self.list(server),
             Choice::Session(file) => {
-                self.fields.session.clone_from(&file);
                 self.open_session(Path::new(&file));
                 self.open_dialog.is_open = false;
             }

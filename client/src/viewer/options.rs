@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::{look::Look, settings::Settings};
-use crate::{camera::Camera, engine::ClipBox, path::PathSource, render::GpuPath};
+use super::settings::Settings;
+use crate::{
+    camera::Camera, commands::view::LookArgs, engine::ClipBox, path::PathSource, render::GpuPath,
+};
 
 /// What draws the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -31,10 +33,12 @@ pub struct ViewOptions {
     pub settings_file: Option<PathBuf>,
     /// What was wrong with the settings' file.
     pub settings_trouble: Option<String>,
-    /// The look that the command line gives, if it gives any part of it.
-    pub look: Option<Look>,
-    /// Whether the command line gives the budget, and the smallest node.
-    pub budget_given: bool,
+    /// The parts of the look that the command line gives.
+    pub look: LookArgs,
+    /// The budget, if the command line gives it.
+    pub point_budget: Option<u64>,
+    /// The smallest node, if the command line gives it.
+    pub min_node_px: Option<f64>,
     /// Where from, at first.
     pub camera: Option<Camera>,
     /// What the view is limited to.

@@ -21,15 +21,23 @@ pub struct Known {
     pub lattice: Option<Lattice>,
 }
 
-/// Reads position and attributes of a point, to the last bit. Waits for the source: not for the window's
-/// thread.
+/// Reads position and attributes of a point, to the last bit, of the dataset that was drawn. Waits for the
+/// source: not for the window's thread.
 ///
 /// # Errors
 /// What went wrong, for people.
-pub fn fetch(source: &str, key: NodeKey, point: usize) -> Result<Known, String> {
+pub fn fetch(
+    source: &str,
+    key: NodeKey,
+    point: usize,
+    drawn: Option<&Manifest>,
+) -> Result<Known, String> {
     let source = Source::parse(source).map_err(|e| e.to_string())?;
     let source = BlockingSource::new(source).map_err(|e| e.to_string())?;
     let dataset = Dataset::open(source).map_err(|e| e.to_string())?;
+    if drawn.is_some_and(|drawn| drawn != dataset.manifest()) {
+        return Err("the dataset has changed since: this is where the point was before".into());
+    }
     read(&dataset, key, point).map_err(|e| e.to_string())
 }
 

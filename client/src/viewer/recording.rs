@@ -10,6 +10,9 @@ use crate::{
 /// Between two keys of a recording.
 const STEP: Duration = Duration::from_millis(250);
 
+/// Of a movement, before its first picture.
+const FRAME: Duration = Duration::from_millis(16);
+
 /// Longest recording.
 const LONGEST: Duration = Duration::from_secs(3600);
 
@@ -31,7 +34,15 @@ impl Recorder {
     pub fn note(&mut self, camera: &Camera, now: Instant) -> bool {
         let time = now.saturating_duration_since(self.begin);
         let last = self.keys.last().map_or(0.0, |key| key.time);
-        if time.as_secs_f64() - last >= STEP.as_secs_f64() {
+        let since = time.as_secs_f64() - last;
+        if since >= STEP.as_secs_f64() {
+            // Nothing was drawn meanwhile, because nothing moved: a rest ends where the movement begins.
+            if since > 2.0 * STEP.as_secs_f64()
+                && let Some(&rest) = self.keys.last()
+                && key(camera, rest.time) != rest
+            {
+                self.keys.push(KeyFrame { time: time.as_secs_f64() - FRAME.as_secs_f64(), ..rest });
+            }
             self.push(camera, time);
         }
         time < LONGEST
@@ -150,9 +161,20 @@ mod tests {
         let mut recorder = Recorder::start(&camera(0.0), start);
         let flat =
             |x: f64| Camera { projection: Projection::Orthographic { height: 3.0 }, ..camera(x) };
-        recorder.note(&flat(1.0), start + Duration::from_secs(1));
-        recorder.note(&flat(2.0), start + Duration::from_secs(2));
-        let path = recorder.stop(&flat(2.0), start + Duration::from_secs(2)).expect("a path");
-        assert_eq!((path.keys().len(), path.start()), (2, 1.0));
+        recorder.note(&flat(1.0), start + Duration::from_millis(300));
+        recorder.note(&flat(2.0), start + Duration::from_millis(600));
+        let path = recorder.stop(&flat(2.0), start + Duration::from_millis(600)).expect("a path");
+        assert_eq!((path.keys().len(), path.start()), (2, 0.3));
+    }
+
+    #[test]
+    fn a_rest_in_which_nothing_is_drawn_stays_a_rest() {
+        let start = Instant::now();
+        let mut recorder = Recorder::start(&camera(0.0), start);
+        recorder.note(&camera(1.0), start + Duration::from_secs(10));
+        let path =
+            recorder.stop(&camera(2.0), start + Duration::from_millis(10_300)).expect("a path");
+        assert!((path.at(9.9).eye - camera(0.0).eye).length() < 1e-9);
+        assert!((path.at(10.0).eye - camera(1.0).eye).length() < 1e-9);
     }
 }

@@ -51,6 +51,9 @@ pub struct Session {
     /// What the view is limited to.
     #[serde(default, with = "clip_option", skip_serializing_if = "Option::is_none")]
     pub clip: Option<ClipBox>,
+    /// Whether it is limited to it at the moment.
+    #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    pub clips: bool,
     /// Places to come back to.
     #[serde(default)]
     pub bookmarks: Vec<Bookmark>,
@@ -104,6 +107,7 @@ impl Session {
             point_budget: None,
             min_node_px: None,
             clip: None,
+            clips: true,
             bookmarks: Vec::new(),
             measurements: Vec::new(),
         }
@@ -147,7 +151,18 @@ impl Session {
     /// # Errors
     /// `StoredError::Write`.
     pub fn save(&self, path: &Path) -> Result<(), StoredError> {
-        stored::write(path, self)
+        let mut session = self.clone();
+        // What lies beside the session, or below, is found there wherever both are moved.
+        let folder = std::path::absolute(path).ok();
+        let folder = folder.as_deref().and_then(Path::parent);
+        for cloud in &mut session.clouds {
+            let beside =
+                folder.and_then(|folder| Path::new(&cloud.source).strip_prefix(folder).ok());
+            if let Some(beside) = beside.map(|beside| beside.display().to_string()) {
+                cloud.source = beside;
+            }
+        }
+        stored::write(path, &session)
     }
 
     fn check(&self) -> Result<(), String> {

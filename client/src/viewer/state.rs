@@ -25,7 +25,7 @@ use super::{
     picking::Picked,
     point_values::{self, Known, Values},
     recording::{Player, Recorder},
-    session::{Bookmark, Session},
+    session::{Bookmark, Session, SessionCloud},
     settings::Settings,
 };
 use crate::{
@@ -126,6 +126,10 @@ pub struct Viewer {
     pub fields: Fields,
     pub shows_help: bool,
     pub is_closing: bool,
+    /// Clouds of the session that could not be opened: they stay in it.
+    pub unopened: Vec<SessionCloud>,
+    /// Number of the last picture's file.
+    pub last_picture: u64,
     /// A picture of the view is to be written.
     pub wants_picture: bool,
     /// The newest plan that was taken, and what is shown of it.
@@ -220,6 +224,8 @@ impl Viewer {
             camera: Camera::overview(DVec3::ZERO, DVec3::ONE, 1.5),
             drag: None,
             first_view: None,
+            unopened: Vec::new(),
+            last_picture: 0,
             anchor: None,
         };
         viewer.open_first(options);
@@ -231,15 +237,11 @@ impl Viewer {
             self.warn(trouble);
         }
         if let Some(file) = &options.session {
-            self.fields.session = file.display().to_string();
             self.open_session(file);
-            if let Some(look) = options.look {
-                self.settings.look = look;
-            }
-            if options.budget_given {
-                self.settings.point_budget = options.settings.point_budget;
-                self.settings.min_node_px = options.settings.min_node_px;
-            }
+            self.settings.look = options.look.upon(self.settings.look);
+            let settings = &mut self.settings;
+            settings.point_budget = options.point_budget.unwrap_or(settings.point_budget);
+            settings.min_node_px = options.min_node_px.unwrap_or(settings.min_node_px);
             if options.clip.is_some() {
                 self.clip = Clip { is_on: true, bounds: options.clip };
             }
@@ -279,17 +281,29 @@ impl Viewer {
         self.add(Cloud::new(source));
     }
 
-    fn add(&mut self, cloud: Cloud) {
+    /// Adds a cloud; `false`, and told, where its source is none.
+    fn add(&mut self, mut cloud: Cloud) -> bool {
         let source = match Source::parse(&cloud.source) {
             Ok(source) => source,
-            Err(error) => return self.warn(error.to_string()),
+            Err(error) => {
+                self.warn(error.to_string());
+                return false;
+            }
         };
+        // A file is found again from wherever the program is started next.
+        let file = Path::new(&cloud.source);
+        if file.is_file()
+            && let Ok(file) = std::path::absolute(file)
+        {
+            cloud.source = file.display().to_string();
+        }
         self.settings.note_recent(&cloud.source);
         let number = self.engine.add(source);
         self.engine.set_visible(number, cloud.is_visible);
         debug_assert_eq!(number, self.clouds.len());
         self.clouds.push(cloud);
         self.open_dialog.is_open = false;
+        true
     }
 
     /// Closes a cloud.
@@ -339,32 +353,50 @@ impl Viewer {
             Ok(session) => session,
             Err(error) => return self.warn(error.to_string()),
         };
+        self.take_over();
+        self.end_export();
+        self.stop_recording();
+        if let Tool::Measure(from) = &mut self.tool {
+            *from = None;
+        }
         self.close_all();
+        self.fields.session = file.display().to_string();
         self.settings.look = session.look;
         self.settings.point_budget = session.point_budget.unwrap_or(self.settings.point_budget);
         self.settings.min_node_px = session.min_node_px.unwrap_or(self.settings.min_node_px);
-        self.clip = Clip { is_on: session.clip.is_some(), bounds: session.clip };
+        self.clip = Clip { is_on: session.clip.is_some() && session.clips, bounds: session.clip };
         self.bookmarks = session.bookmarks;
         self.measurements = session.measurements;
-        for cloud in &session.clouds {
-            self.add(Cloud::from_session(cloud));
+        self.unopened.clear();
+        for cloud in session.clouds {
+            if !self.add(Cloud::from_session(&cloud)) {
+                self.unopened.push(cloud);
+            }
         }
-        if let Some(camera) = &session.camera {
-            self.navigator.jump(camera);
+        match &session.camera {
+            Some(camera) => self.navigator.jump(camera),
+            None => {
+                self.navigator.forget_choice();
+                self.first_view = None;
+            }
         }
         self.events.tell("session", json!({ "opened": file }));
-        self.messages.tell(Weight::Note, format!("Opened {}", file.display()));
+        let rest = match self.unopened.len() {
+            0 => String::new(),
+            n => format!("; {n} of its clouds cannot be opened now, and stay in it"),
+        };
+        self.messages.tell(Weight::Note, format!("Opened {}{rest}", file.display()));
     }
 
     /// Saves what is looked at, from where and how.
     pub fn save_session(&mut self, file: &Path) {
-        let clouds = self.open_clouds().map(|(_, cloud)| cloud.to_session()).collect();
-        let mut session = Session::new(clouds);
+        let open = self.open_clouds().map(|(_, cloud)| cloud.to_session());
+        let mut session = Session::new(open.chain(self.unopened.iter().cloned()).collect());
         session.camera = Some(self.camera);
         session.look = self.settings.look;
         session.point_budget = Some(self.settings.point_budget);
         session.min_node_px = Some(self.settings.min_node_px);
-        session.clip = self.clip.active();
+        (session.clip, session.clips) = (self.clip.bounds, self.clip.is_on);
         session.bookmarks.clone_from(&self.bookmarks);
         session.measurements.clone_from(&self.measurements);
         match session.save(file) {
@@ -470,7 +502,9 @@ impl Viewer {
                             self.messages.tell(Weight::Note, text);
                         }
                         Err(error) => {
-                            self.export = None;
+                            if exported {
+                                self.export = None;
+                            }
                             self.messages.tell(Weight::Warning, error);
                         }
                     }
@@ -488,10 +522,12 @@ impl Viewer {
     pub fn set_picked(&mut self, point: Picked) {
         self.picks += 1;
         let number = self.picks;
-        let (source, picked) = (self.clouds[point.cloud].source.clone(), point.clone());
+        let cloud = &self.clouds[point.cloud];
+        let (source, drawn, picked) =
+            (cloud.source.clone(), cloud.manifest().cloned(), point.clone());
         self.jobs.start(move || Answer::Values {
             pick: number,
-            known: point_values::fetch(&source, picked.key, picked.point),
+            known: point_values::fetch(&source, picked.key, picked.point, drawn.as_ref()),
             point: picked,
         });
         let mut ends_measurement = false;
@@ -560,15 +596,24 @@ impl Viewer {
 
     /// Plays a path from its begin.
     pub fn play(&mut self, path: CameraPath) {
-        self.recorder = None;
         self.path = Some(path);
         self.player = Some(Player::start(Instant::now()));
     }
 
-    /// Ends whatever moves the camera by itself; hands take over where it is.
+    /// Ends a path that moves the camera; hands take over where it is. An export goes on: a hand that slips
+    /// must not cost hours.
     pub fn take_over(&mut self) {
-        if self.player.take().is_some() || self.export.take().is_some() {
+        if self.player.take().is_some() {
             self.navigator.jump(&self.camera);
+        }
+    }
+
+    /// Ends an export before its time, if there is one.
+    pub fn end_export(&mut self) {
+        if let Some(export) = self.export.take() {
+            let (done, all) = export.progress();
+            self.navigator.jump(&self.camera);
+            self.note(format!("Export ended, {done} of {all} pictures are written"));
         }
     }
 }

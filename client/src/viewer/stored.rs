@@ -66,6 +66,15 @@ pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), StoredError> {
     let failed = |why: String| StoredError::Write { path: path.to_owned(), why };
     let mut text = serde_json::to_string_pretty(value).map_err(|e| failed(e.to_string()))?;
     text.push('\n');
+    write_text(path, &text)
+}
+
+/// The same of what is a text already.
+///
+/// # Errors
+/// [`StoredError::Write`].
+pub fn write_text(path: &Path, text: &str) -> Result<(), StoredError> {
+    let failed = |why: String| StoredError::Write { path: path.to_owned(), why };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     let write = || {

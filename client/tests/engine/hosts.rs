@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use lodestream_client::engine::{Engine, EngineConfig, EngineError};
+use lodestream_protocol::{HEADER_BYTES, Header};
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::{
@@ -242,6 +243,37 @@ fn what_is_no_dataset_is_an_error() {
         let message = engine.wait_open(LONG).expect_err("failed").to_string();
         assert!(message.contains(words), "{message}");
     }
+}
+
+#[test]
+fn nodes_beyond_the_end_are_left_out_and_never_asked_for_and_the_rest_goes_on() {
+    let recipe = Recipe::default();
+    let mut bytes = dataset(recipe);
+    let config = EngineConfig { point_budget: u64::MAX, ..config() };
+    let whole = expected(&bytes, &config, overview(recipe.corner));
+    // A header that says so, sound in itself: the last nodes lie behind what it tells.
+    let mut header = Header::parse(&bytes).expect("a header");
+    header.file_bytes -= 1000;
+    bytes[..HEADER_BYTES].copy_from_slice(&header.encode());
+    let end = header.file_bytes;
+    bytes.truncate(end as usize);
+    let host = Host::good(bytes);
+    let engine = Engine::start(vec![http_source(&host)], config).expect("starts");
+    engine.set_view(overview(recipe.corner));
+    let plan = engine.wait_settled(LONG).expect("settles");
+    let problems = engine.stats().problems;
+    assert!(!problems.is_empty(), "told");
+    assert!(
+        problems.iter().all(|p| p.contains("beyond the end") && p.contains("left out")),
+        "{problems:?}"
+    );
+    let found = picture(&plan);
+    assert!(found.len() < whole.len() && found.len() * 2 > whole.len());
+    assert!(found.iter().all(|(key, node)| whole.get(key) == Some(node)));
+    let asked = host.requests();
+    assert!(asked.iter().all(|r| r.range.is_none_or(|(from, _)| from < end)), "{asked:?}");
+    // The prefix is asked for once: the cloud as a whole is sound.
+    assert_eq!(asked.iter().filter(|r| r.range.is_some_and(|(from, _)| from == 0)).count(), 1);
 }
 
 #[test]

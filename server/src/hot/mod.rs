@@ -21,7 +21,7 @@ use bytes::{Buf, BytesMut};
 use tokio::{
     net::TcpStream,
     sync::watch,
-    time::{Instant, timeout_at},
+    time::{Instant, timeout, timeout_at},
 };
 
 use self::{
@@ -87,8 +87,11 @@ pub(crate) async fn serve(
             return Some(bytes);
         }
         let start = Instant::now();
-        let answer = Answer::to(site, &request, &bytes[body.clone()]).await;
-        let Some(answer) = answer else { return Some(bytes) };
+        let answer = Answer::to(site, &request, &bytes[body.clone()]);
+        // What takes too long is the long way's to refuse.
+        let Ok(Some(answer)) = timeout(limits.response_timeout, answer).await else {
+            return Some(bytes);
+        };
         reply.clear();
         answer.write_head(&mut reply);
         let until_first_byte = start.elapsed();

@@ -75,6 +75,8 @@ impl Socket<'_> {
                 let of_head = sent.min(head.len());
                 head = &head[of_head..];
                 piece = &piece[sent - of_head..];
+                // A client that takes all at once must not keep others waiting.
+                tokio::task::coop::consume_budget().await;
             }
         }
         Ok(())
@@ -96,6 +98,7 @@ impl Socket<'_> {
             let send = || copy.send_pages(self.stream, &range);
             let sent = self.wait(self.stream.try_io(Interest::WRITABLE, send)).await?;
             range.start += sent as u64;
+            tokio::task::coop::consume_budget().await;
         }
         Ok(())
     }

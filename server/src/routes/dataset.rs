@@ -74,7 +74,7 @@ pub(super) async fn open(
         Ok(file) => file,
         Err(OpenError::Missing) => return Err(missing(file_name)),
         Err(OpenError::Unreadable(reason)) => {
-            tracing::warn!("{file_name}: {reason}");
+            tracing::warn!("{file_name:?}: {reason}");
             // It may be on its way into the folder: worth another try.
             let line = format!("{file_name} cannot be served: {reason}");
             return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, line));

@@ -162,6 +162,7 @@ pub(crate) fn router(site: Arc<Site>, config: &ServeConfig) -> Router {
         .layer(middleware::from_fn_with_state(Arc::clone(&site), guard::admit))
         .layer(cross_origin())
         .layer(middleware::from_fn(options::options))
+        .layer(middleware::from_fn(options::host))
         .layer(middleware::from_fn_with_state(site, observe))
 }
 

@@ -18,7 +18,8 @@ use std::{
 use lodestream_preprocess::preview::MAX_PREVIEW_BYTES;
 use lodestream_protocol::{Error as FormatError, HEADER_BYTES, Header};
 use object_store::{
-    Error as StoreError, GetOptions, GetRange, ObjectMeta, ObjectStore, parse_url_opts, path::Path,
+    Error as StoreError, GetOptions, GetRange, ObjectMeta, ObjectStore, parse_url_opts,
+    path::{Path, PathPart},
 };
 use quick_cache::sync::Cache;
 use tokio::{sync::Semaphore, task::JoinSet};
@@ -150,7 +151,7 @@ impl Objects {
         file_name: &str,
         former: Option<Arc<ObjectState>>,
     ) -> std::result::Result<Arc<ObjectState>, OpenError> {
-        let location = self.prefix.clone().join(file_name);
+        let location = self.location(file_name)?;
         let options = GetOptions {
             if_none_match: former.as_ref().and_then(|former| former.meta.e_tag.clone()),
             range: Some(GetRange::Bounded(0..BLOCK_BYTES)),
@@ -162,7 +163,7 @@ impl Objects {
                 return former.ok_or(OpenError::Missing);
             }
             Err(Failure::Store(StoreError::NotFound { .. })) => return Err(OpenError::Missing),
-            Err(e) => return Err(OpenError::Unreadable(e.to_string())),
+            Err(e) => return Err(unanswered(file_name, &e)),
         };
         let same =
             former.filter(|former| Identity::of_object(&former.meta) == Identity::of_object(&meta));
@@ -187,13 +188,19 @@ impl Objects {
 
     /// A small file beside the datasets.
     pub(super) async fn small(&self, name: &str) -> std::result::Result<SmallFile, OpenError> {
-        let location = self.prefix.clone().join(name);
+        let location = self.location(name)?;
         let range = Some(GetRange::Bounded(0..MAX_PREVIEW_BYTES as u64));
         match self.get(&location, GetOptions { range, ..GetOptions::default() }).await {
             Ok((meta, bytes)) if meta.size == bytes.len() as u64 => Ok(SmallFile { bytes }),
             Ok(_) | Err(Failure::Store(StoreError::NotFound { .. })) => Err(OpenError::Missing),
-            Err(e) => Err(OpenError::Unreadable(e.to_string())),
+            Err(e) => Err(unanswered(name, &e)),
         }
+    }
+
+    /// Where an object of that name lies: as it is, for stores have names of any letters.
+    fn location(&self, name: &str) -> std::result::Result<Path, OpenError> {
+        let name = PathPart::parse(name).map_err(|_| OpenError::Missing)?;
+        Ok(self.prefix.clone().join(name))
     }
 
     /// A block that is in memory.
@@ -274,4 +281,9 @@ impl From<Failure> for io::Error {
 /// What an error says, in one line.
 fn told(error: &StoreError) -> String {
     error.to_string().lines().map(str::trim).collect::<Vec<_>>().join(" ")
+}
+/// What the store says is for the log: it has addresses and more that clients need not know.
+fn unanswered(name: &str, failure: &Failure) -> OpenError {
+    tracing::warn!("{name:?}: {failure}");
+    OpenError::Unreadable("the object store does not answer as it should".into())
 }

@@ -27,6 +27,8 @@ pub struct Cloud {
     pub pace: Pace,
     /// Failed requests in a row.
     pub failures: u32,
+    /// When that was last counted.
+    pub failed_at: Option<Instant>,
     /// No request before then.
     pub not_before: Option<Instant>,
     /// Whether it is told to have failed.
@@ -51,6 +53,7 @@ impl Cloud {
             delivered: Arc::default(),
             pace: Pace::default(),
             failures: 0,
+            failed_at: None,
             not_before: None,
             failed: false,
             is_in_doubt: false,

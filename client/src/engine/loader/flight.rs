@@ -105,6 +105,11 @@ impl Flight {
         received.saturating_mul(4) >= self.len.saturating_mul(3)
     }
 
+    /// When it was sent.
+    pub const fn sent(&self) -> Instant {
+        self.sent
+    }
+
     /// Bytes that are still to come.
     pub fn left_bytes(&self) -> u64 {
         self.len.saturating_sub(self.progress.bytes.load(Ordering::Relaxed))

@@ -55,6 +55,10 @@ use super::{
 /// No request is started while more decoded bytes than this wait for the traversal.
 const MAX_BACKLOG_BYTES: u64 = 128 << 20;
 
+/// No piece is asked for that is longer, or becomes larger: such are not what they seem.
+const MAX_PIECE_BYTES: u64 = 256 << 20;
+const MAX_DECODED_BYTES: u64 = 1 << 30;
+
 /// A piece that arrived damaged this often is damaged at the source.
 const MAX_DAMAGED: u32 = 3;
 
@@ -112,6 +116,8 @@ pub(super) struct Loader {
     pieces: Pieces,
     flights: HashMap<FlightId, Flight>,
     next_flight: FlightId,
+    /// When it was last looked at what may be started.
+    dispatched_at: Instant,
     /// Where decoding goes; where there are none, it is done at once, on this thread: simulated time must not
     /// pass meanwhile.
     decoders: Option<rayon::ThreadPool>,
@@ -140,6 +146,7 @@ impl Loader {
             pieces: Pieces::default(),
             flights: HashMap::new(),
             next_flight: 0,
+            dispatched_at: Instant::now(),
             decoders: None,
             connections: Connections::default(),
             gates: HashMap::new(),
@@ -204,6 +211,7 @@ impl Loader {
         self.demand.retain(|piece| self.clouds.contains_key(&piece.id.node.cloud));
         self.wanted = self.demand.iter().map(|piece| piece.id).collect();
         self.pieces.update(&self.wanted, demand.seen);
+        self.refuse_unsound();
         if self.config.order == LoadOrder::Arrival {
             self.take_turns();
         }
@@ -219,6 +227,30 @@ impl Loader {
         for (id, flight) in stale {
             self.shared.counters.cancelled.add(1);
             self.break_off(id, &flight);
+        }
+    }
+
+    /// Gives up wanted pieces that no sound dataset has, before anything is asked for or kept of them.
+    fn refuse_unsound(&mut self) {
+        let now = Instant::now();
+        let why = |piece: &Piece| {
+            let boot = self.clouds.get(&piece.id.node.cloud)?.boot.as_ref()?;
+            let bytes = boot.header.file_bytes;
+            if piece.offset.checked_add(piece.len).is_none_or(|end| end > bytes) {
+                return Some(format!("it lies beyond the end of the file, at {bytes} bytes"));
+            }
+            let decoded = decode::decoded_bytes(piece, &boot.manifest);
+            let is_large = piece.len > MAX_PIECE_BYTES || decoded > MAX_DECODED_BYTES;
+            is_large.then(|| format!("it would take {decoded} bytes"))
+        };
+        let free = self.demand.iter().filter(|piece| self.pieces.is_free(piece.id, now));
+        let unsound: Vec<_> = free.filter_map(|piece| Some((piece.id, why(piece)?))).collect();
+        for (id, why) in unsound {
+            let Some(cloud) = self.clouds.get(&id.node.cloud) else { continue };
+            let message =
+                format!("{}: node {}: {why}; left out", cloud.source.describe(), id.node.key);
+            let number = self.shared.traversal.post(Event::Lost { piece: id, message });
+            self.pieces.deliver(id, number);
         }
     }
 
@@ -339,8 +371,12 @@ impl Loader {
                 if let Some((wait, bytes, time)) = flight.measured(delivered) {
                     cloud.pace.note(wait, bytes, time);
                 }
-                cloud.not_before = None;
                 cloud.doubts = 0;
+                // An answer that was on its way before the host failed says nothing of it.
+                if cloud.failed_at.is_some_and(|at| flight.sent() <= at) {
+                    return;
+                }
+                cloud.not_before = None;
                 if std::mem::take(&mut cloud.failures) > 0 {
                     self.shared.trouble(Some(cloud.number), None);
                 }
@@ -355,8 +391,12 @@ impl Loader {
         }
         self.shared.counters.retries.add(1);
         self.shared.trouble(Some(cloud.number), Some(error.to_string()));
-        cloud.failures = cloud.failures.saturating_add(1);
-        cloud.not_before = Some(Instant::now() + Backoff::default().delay(cloud.failures));
+        // Those that were on their way together fail together: once.
+        if cloud.failed_at.is_none_or(|at| flight.sent() > at) {
+            cloud.failures = cloud.failures.saturating_add(1);
+            cloud.failed_at = Some(Instant::now());
+            cloud.not_before = Some(Instant::now() + Backoff::default().delay(cloud.failures));
+        }
         let missing = flight.pieces.iter().filter(|piece| self.pieces.is_loading(piece.id, id));
         let missing: Vec<_> = missing.map(|piece| piece.id).collect();
         for (index, id) in missing.into_iter().enumerate() {
@@ -374,6 +414,7 @@ impl Loader {
     /// Starts what may be started.
     fn dispatch(&mut self) {
         let now = Instant::now();
+        self.dispatched_at = now;
         self.take_from_prefixes(now);
         let free = self.config.requests_in_flight.max(1).saturating_sub(self.flights.len());
         if free > 0 && self.pieces.backlog_bytes() <= MAX_BACKLOG_BYTES {
@@ -500,12 +541,11 @@ impl Loader {
 
     /// When something that waits after a failure may go on.
     fn next_retry(&self) -> Option<Instant> {
-        let now = Instant::now();
         let pieces = self.demand.iter().filter_map(|piece| self.pieces.retry_at(piece.id));
         let wanted: HashSet<_> = self.demand.iter().map(|piece| piece.id.node.cloud).collect();
         let clouds = wanted.into_iter().filter_map(|cloud| self.clouds.get(&cloud)?.not_before);
-        // What is past waits for a free request, not for the clock.
-        clouds.chain(pieces).filter(|&at| at > now).min()
+        // What was past when it was looked at waits for a free request, not for the clock.
+        clouds.chain(pieces).filter(|&at| at > self.dispatched_at).min()
     }
 }
 

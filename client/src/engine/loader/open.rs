@@ -74,7 +74,10 @@ pub async fn open(
         };
         match error {
             // What has come is good; the rest is asked for as everything else is.
-            SourceError::Transient { .. } if reader.end(&told) => return Ok(()),
+            SourceError::Transient { .. } if reader.end(&told) => {
+                shared.trouble(Some(ask.number), None);
+                return Ok(());
+            }
             SourceError::Transient { .. } => {}
             SourceError::Replaced { .. } => source = source.renew().map_err(|e| e.to_string())?,
             SourceError::Permanent { .. } => return Err(error.to_string()),

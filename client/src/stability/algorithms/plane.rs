@@ -111,8 +111,8 @@ fn two_ways(cloud: &Cloud) -> Row {
         (0.0, "the same integers"),
         "the other way",
     )
-    .beside("single precision, shifted or not", apart(of(naive::covariance_f32(&world)), shifted))
-    .beside("double precision, shifted or not", apart(of(naive::covariance_f64(&world)), shifted))
+    .beside("single precision, unshifted", apart(of(naive::covariance_f32(&world)), shifted))
+    .beside("double precision, unshifted", apart(of(naive::covariance_f64(&world)), shifted))
 }
 
 fn flat(cloud: &Cloud) -> Row {

@@ -59,9 +59,9 @@ fn show_picked(viewer: &mut Viewer, ui: &mut Ui, palette: Palette) {
     }
     ui.add_space(4.0);
     ui.horizontal(|ui| {
-        if ui.button("Copy").on_hover_text("Copy the coordinates (Ctrl C)").clicked() {
+        if ui.button("Copy").on_hover_text("Copy the coordinates").clicked() {
             let context = ui.ctx().clone();
-            viewer.copy(&context);
+            viewer.copy_text(pick.point.text.join(" "), &context);
         }
         if ui.button("Turn around it").clicked() {
             viewer.take_over();

@@ -3,14 +3,14 @@
 use egui::{Align2, FontId, Painter, Pos2, Stroke, vec2};
 
 use super::MARGIN;
-use crate::viewer::{numbers, state::Viewer, theme::Palette};
+use crate::viewer::{navigation::Pose, numbers, state::Viewer, theme::Palette};
 
 /// Longest bar, logical pixels.
 const LONGEST: f32 = 150.0;
 
 pub fn draw(viewer: &Viewer, painter: &Painter, palette: Palette) {
     let rect = viewer.view_rect;
-    let world_per_point = viewer.navigator.pose().height() / f64::from(rect.height());
+    let world_per_point = Pose::of(&viewer.camera).height() / f64::from(rect.height());
     let world = numbers::round_below(f64::from(LONGEST) * world_per_point);
     let length = (world / world_per_point) as f32;
     if !(8.0..=LONGEST * 1.1).contains(&length) {

@@ -5,7 +5,7 @@ use egui::{ComboBox, DragValue, Ui};
 use super::{field, slider};
 use crate::{
     render::{ColorMode, EyeDome, LARGEST_SPLAT_PX, SMALLEST_SPLAT_PX, Splat, SplatSize},
-    viewer::{state::Viewer, theme::Palette},
+    viewer::{navigation::Pose, state::Viewer, theme::Palette},
 };
 
 /// Kinds of sizes.
@@ -14,7 +14,7 @@ const KINDS: [&str; 5] = ["pixels", "world units", "by level", "adaptive", "own"
 pub fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let palette = Palette::of(viewer.settings.theme);
     // Sizes in world units begin with what two pixels are now.
-    let pixel = viewer.navigator.pose().height() / f64::from(viewer.size_px[1]);
+    let pixel = Pose::of(&viewer.camera).height() / f64::from(viewer.size_px[1]);
     let look = &mut viewer.settings.look;
     field(ui, palette, "Colour", |ui| {
         ComboBox::from_id_salt("look color").selected_text(look.color.name()).show_ui(ui, |ui| {

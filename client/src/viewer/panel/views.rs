@@ -73,7 +73,7 @@ fn path(viewer: &mut Viewer, ui: &mut Ui, palette: Palette) {
         let tip = "So many pictures along the path, each complete, into this folder";
         if ui.add_enabled(has_path, Button::new(label)).on_hover_text(tip).clicked() {
             if viewer.export.is_some() {
-                viewer.take_over();
+                viewer.end_export();
             } else {
                 viewer.start_export();
             }

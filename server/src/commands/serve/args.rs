@@ -40,7 +40,7 @@ pub struct ServeArgs {
     /// Address of a proxy in front, whose X-Forwarded-… fields are believed
     #[arg(long, value_name = "IP", env = "LODESTREAM_TRUSTED_PROXIES", value_delimiter = ',')]
     pub trusted_proxy: Vec<std::net::IpAddr>,
-    /// Most connections at a time [default: 4096]
+    /// Most connections at a time [default: 8192]
     #[arg(long, value_name = "N", env = "LODESTREAM_MAX_CONNECTIONS")]
     pub max_connections: Option<usize>,
     /// Requests a second that one client may make in the long run; 0: any number [default: 0]
