@@ -297,6 +297,24 @@ mod tests {
     }
 
     #[test]
+    fn a_session_that_is_moved_with_its_files_is_opened_and_a_box_that_is_off_is_kept() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let [old, new] = ["old", "new"].map(|name| folder.path().join(name));
+        std::fs::create_dir(&old).expect("made");
+        std::fs::write(old.join("b.lods"), "").expect("written");
+        let source = old.join("b.lods").display().to_string();
+        let cloud = SessionCloud { source, ..session().clouds.remove(0) };
+        let elsewhere = SessionCloud { source: "/elsewhere/c.lods".into(), ..cloud.clone() };
+        let saved = Session { clouds: vec![cloud, elsewhere], clips: false, ..session() };
+        saved.save(&old.join("a.json")).expect("saved");
+        std::fs::rename(&old, &new).expect("moved");
+        let opened = Session::open(&new.join("a.json")).expect("own file");
+        assert_eq!(opened.clouds[0].source, new.join("b.lods").display().to_string());
+        assert_eq!(opened.clouds[1].source, "/elsewhere/c.lods");
+        assert_eq!((opened.clip, opened.clips), (saved.clip, false));
+    }
+
+    #[test]
     fn what_is_no_session_is_refused_with_a_reason() {
         let folder = tempfile::tempdir().expect("temporary folder");
         let path = folder.path().join("a.json");

@@ -80,3 +80,27 @@ async fn names_with_blanks_and_signs_are_reached_through_the_index() {
     let body = site.get(&format!("/{url}"), &[]).await.bytes().await.expect("a body");
     assert!(body == bytes);
 }
+
+#[test]
+fn a_request_names_its_host_once() {
+    let (site, _) = Site::with_dataset();
+    for (version, hosts, status) in [
+        ("1.1", "", "400"),
+        ("1.1", "host: a\r\nhost: b\r\n", "400"),
+        ("1.1", "host: a\r\n", "206"),
+        ("1.0", "", "206"),
+    ] {
+        let mut stream = TcpStream::connect(site.server.addr()).expect("the server accepts");
+        let request = format!(
+            "GET /a.lods HTTP/{version}\r\n{hosts}range: bytes=0-9\r\nconnection: close\r\n\r\n"
+        );
+        stream.write_all(request.as_bytes()).expect("the server reads");
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).expect("an answer");
+        let first = String::from_utf8_lossy(&answer).lines().next().map(str::to_owned);
+        assert!(
+            first.as_ref().is_some_and(|line| line.contains(status)),
+            "{version} {hosts:?}: {first:?}"
+        );
+    }
+}
