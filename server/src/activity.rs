@@ -30,7 +30,7 @@ struct Streams {
     open: HashMap<u64, Instant>,
     /// The next of these.
     next: u64,
-    /// When a request was last begun or ended.
+    /// When a request last ended, or the connection began.
     last: Instant,
 }
 
@@ -42,9 +42,7 @@ impl Activity {
 
     /// A request has come.
     pub(crate) fn begin(self: &Arc<Self>) -> Handling {
-        let mut streams = self.streams();
-        streams.handled += 1;
-        streams.last = Instant::now();
+        self.streams().handled += 1;
         Handling(Arc::clone(self))
     }
 

@@ -101,9 +101,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
 fn hosted(text: &str) -> Result<Policy, String> {
     match text.parse()? {
         Policy::PotreeBrotli => {
-            Err("no such files are hosted here: 'eval' has this policy, on made-up \
-                                     links; take potree"
-                .into())
+            let why = "no such files are hosted here: 'eval' has this policy, on made-up links";
+            Err(format!("{why}; take potree"))
         }
         policy => Ok(policy),
     }

@@ -10,6 +10,8 @@ pub mod shot;
 pub mod stability;
 pub mod view;
 
+use crate::source::without_secrets;
+
 /// The command line that was given, without what is secret: reports are made to be shown around.
 fn command_line() -> String {
     quoted_line(std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()))
@@ -33,18 +35,14 @@ fn quoted_line(arguments: impl Iterator<Item = String>) -> String {
             return format!("{SECRET}=…");
         }
         // A signature or a password in an address opens what it names.
-        match argument.split_once("://") {
-            Some((scheme, rest)) => {
-                let rest = rest.split(['?', '#']).next().unwrap_or(rest);
-                let host = rest.split('/').next().unwrap_or(rest);
-                let at = host.rfind('@').map_or(0, |at| at + 1);
-                format!("{scheme}://{}", &rest[at..])
-            }
-            None if argument.contains("signature=") => {
-                argument.split('?').next().unwrap_or_default().to_owned()
-            }
-            None => argument,
+        if argument.contains("://") {
+            let url = reqwest::Url::parse(&argument);
+            return url.map_or("…".to_owned(), |url| without_secrets(&url));
         }
+        if argument.contains("signature=") {
+            return argument.split('?').next().unwrap_or_default().to_owned();
+        }
+        argument
     };
     let arguments: Vec<_> = arguments.map(shown).map(quoted).collect();
     format!("lodestream {}", arguments.join(" "))

@@ -10,9 +10,11 @@
 //! It is given what costs it nothing: attributes that are the same everywhere are left out, and colours of 8
 //! bits stay so.
 
-use std::{collections::HashMap, io};
+use std::{collections::HashMap, io, sync::Arc};
 
-use lodestream_protocol::{Dataset, Manifest, MortonCode, NodePoints, ReadAt, ScalarType};
+use lodestream_protocol::{
+    Attribute, Dataset, Manifest, MortonCode, Node, NodePoints, ReadAt, ScalarType,
+};
 use rayon::prelude::*;
 
 /// As the converter has it.
@@ -24,27 +26,48 @@ const WINDOW_BITS: i32 = 22;
 /// Bits of half a position, interleaved: 16 of each axis.
 const HALF_BITS: u32 = 48;
 
-/// Bytes of each node, by where its first group begins in the file; with the attributes of these groups alone.
+/// What the nodes of a dataset weigh.
+#[derive(Debug, Default)]
+pub struct Weights {
+    /// Bytes of each node, by where its first group begins in the file.
+    pub nodes: Arc<HashMap<u64, u64>>,
+    /// Bytes of all of them, if the files were made without what is not shown.
+    pub shown: u64,
+}
+
+/// Weighs the nodes; `shown` are the groups that the picture needs besides the first.
 ///
 /// # Errors
 /// Where the dataset cannot be read.
-pub fn node_bytes<R: ReadAt + Sync>(
-    dataset: &Dataset<R>,
-    groups: &[usize],
-) -> anyhow::Result<HashMap<u64, u64>> {
+pub fn weigh<R: ReadAt + Sync>(dataset: &Dataset<R>, shown: &[usize]) -> anyhow::Result<Weights> {
     let manifest = dataset.manifest();
-    let encode = |node: &lodestream_protocol::Node| {
-        let points = dataset.read_node(node, groups)?;
-        let bytes = compressed(&columns(manifest, &points))?;
-        Ok(node.payloads.first().map(|payload| (payload.offset, bytes)))
+    let groups: Vec<usize> = (0..manifest.groups.len()).collect();
+    let is_shown = |attribute: &Attribute| {
+        attribute.group().is_some_and(|group| group == 0 || shown.contains(&group))
+    };
+    let encode = |node: &Node| {
+        let points = dataset.read_node(node, &groups)?;
+        let all = compressed(&columns(manifest, &points, |_| true))?;
+        let shows_all =
+            points.columns.iter().all(|column| is_shown(&manifest.attributes[column.attribute]));
+        let shown =
+            if shows_all { all } else { compressed(&columns(manifest, &points, is_shown))? };
+        Ok((node.payloads.first().map(|payload| (payload.offset, all)), shown))
     };
     let nodes = dataset.hierarchy()?;
-    let sizes = nodes.par_iter().map(encode).collect::<anyhow::Result<Vec<_>>>()?;
-    Ok(sizes.into_iter().flatten().collect())
+    let weighed = nodes.par_iter().map(encode).collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(Weights {
+        shown: weighed.iter().map(|(_, shown)| shown).sum(),
+        nodes: Arc::new(weighed.into_iter().filter_map(|(node, _)| node).collect()),
+    })
 }
 
-/// The columns of a node before they are compressed, one after the other.
-fn columns(manifest: &Manifest, points: &NodePoints) -> Vec<u8> {
+/// The columns of a node before they are compressed, one after the other; of attributes that are kept.
+fn columns(
+    manifest: &Manifest,
+    points: &NodePoints,
+    keeps: impl Fn(&Attribute) -> bool,
+) -> Vec<u8> {
     let positions = &points.positions;
     let low = |axis: usize| positions.iter().map(|q| q[axis]).min().unwrap_or(0);
     let low = [low(0), low(1), low(2)];
@@ -60,6 +83,9 @@ fn columns(manifest: &Manifest, points: &NodePoints) -> Vec<u8> {
     }
     for column in &points.columns {
         let attribute = &manifest.attributes[column.attribute];
+        if !keeps(attribute) {
+            continue;
+        }
         let len = attribute.value_bytes();
         let values = order.iter().map(|(_, point)| &column.bytes[point * len..][..len]);
         let is_color = attribute.name == "color" && attribute.components == 3;
@@ -110,7 +136,7 @@ impl io::Write for Counted {
 
 #[cfg(test)]
 mod tests {
-    use lodestream_protocol::{Attribute, Column, NodeKey};
+    use lodestream_protocol::{Column, NodeKey};
     use proptest::prelude::*;
 
     use super::*;
@@ -148,7 +174,7 @@ mod tests {
                 ],
                 ..NodePoints::new(NodeKey::ROOT)
             };
-            let columns = columns(&manifest(ScalarType::U16), &node);
+            let columns = columns(&manifest(ScalarType::U16), &node, |_| true);
             prop_assert_eq!(columns.len(), (16 + 8 + 2) * points.len());
             let word = |at: usize| u64::from_le_bytes(columns[at..at + 8].try_into().expect("eight bytes"));
             let low: [u32; 3] = std::array::from_fn(|axis| points.iter().map(|p| p.0[axis]).min().expect("one"));

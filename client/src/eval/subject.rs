@@ -1,7 +1,6 @@
 //! A dataset under evaluation: its file, its tree, and the truth of any view of it.
 
 use std::{
-    collections::HashMap,
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool},
     time::Duration,
@@ -36,10 +35,8 @@ pub struct Subject {
     pub middle: DVec3,
     /// The same points with positions in one part, where the file has them in two.
     whole: Option<PathBuf>,
-    /// What nodes weigh in Potree's encoding, by where they begin in that file.
-    potree: Option<Arc<HashMap<u64, u64>>>,
-    /// What all of them would weigh with the attributes that are shown alone.
-    potree_shown: Option<u64>,
+    /// What the nodes of that file weigh in Potree's encoding.
+    potree: Option<potree::Weights>,
     dataset: Dataset<PositionedFile>,
     /// The nodes that hold every point once.
     nodes: Vec<Node>,
@@ -74,7 +71,6 @@ impl Subject {
             name: name.unwrap_or_default(),
             whole: None,
             potree: None,
-            potree_shown: None,
             path: path.to_owned(),
             clouds: vec![manifest],
             bounds: [bounds.0.into(), bounds.1.into()],
@@ -110,9 +106,7 @@ impl Subject {
         if policies.contains(&Policy::PotreeBrotli) {
             let path = self.whole.as_ref().unwrap_or(&self.path);
             let dataset = Dataset::open(PositionedFile::open(path)?)?;
-            let all: Vec<usize> = (0..dataset.manifest().groups.len()).collect();
-            self.potree = Some(Arc::new(potree::node_bytes(&dataset, &all)?));
-            self.potree_shown = Some(potree::node_bytes(&dataset, shown)?.values().sum());
+            self.potree = Some(potree::weigh(&dataset, shown)?);
         }
         Ok(())
     }
@@ -120,13 +114,13 @@ impl Subject {
     /// Bytes of all nodes in Potree's encoding, where they were weighed.
     #[must_use]
     pub fn potree_bytes(&self) -> Option<u64> {
-        self.potree.as_ref().map(|nodes| nodes.values().sum())
+        self.potree.as_ref().map(|weights| weights.nodes.values().sum())
     }
 
     /// The same of files that were made without the attributes that are not shown.
     #[must_use]
     pub fn potree_shown_bytes(&self) -> Option<u64> {
-        self.potree_shown
+        self.potree.as_ref().map(|weights| weights.shown)
     }
 
     /// An engine that fetches the dataset by such a link and policy, in simulated time.
@@ -147,7 +141,8 @@ impl Subject {
         let config = policy.apply(config);
         let (file, link) = (FileSource::open(path)?, Link::new(link, seed));
         let weighed = self.potree.as_ref().filter(|_| policy == Policy::PotreeBrotli);
-        let foreign = weighed.map(|sizes| Arc::new(ForeignSizes::new(Arc::clone(sizes))));
+        let foreign =
+            weighed.map(|weights| Arc::new(ForeignSizes::new(Arc::clone(&weights.nodes))));
         let source = match &foreign {
             Some(foreign) => Source::linked_as(file, link, Arc::clone(foreign)),
             None => Source::linked(file, link),

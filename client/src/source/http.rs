@@ -551,7 +551,8 @@ fn innermost(error: &reqwest::Error) -> String {
     cause.to_string()
 }
 
-pub(super) fn without_secrets(url: &Url) -> String {
+/// The address without what opens it: neither credentials nor a query, which may be signed.
+pub(crate) fn without_secrets(url: &Url) -> String {
     let mut shown = url.clone();
     shown.set_query(None);
     // Neither can fail for http URLs; if it did, the URL holds no credentials.

@@ -39,7 +39,7 @@ fn address(text: &str) -> Option<Url> {
 pub fn list_datasets(server: &str) -> Result<DatasetIndex, SourceError> {
     let url = address(server)
         .ok_or_else(|| SourceError::permanent(server, "not the address of a server"))?;
-    let place = super::http::without_secrets(&url);
+    let place = super::without_secrets(&url);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|e| SourceError::transient(&place, format!("no thread: {e}")))?;
     // The client that datasets are read by.

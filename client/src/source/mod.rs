@@ -34,6 +34,7 @@ pub use error::SourceError;
 pub use fault::Fault;
 pub use file::FileSource;
 pub use http::HttpSource;
+pub(crate) use http::without_secrets;
 pub use link::{Link, LinkSpec};
 pub use linked::{ForeignSizes, LinkedSource};
 pub use listing::{datasets_of_folder, is_server, list_datasets};

@@ -205,6 +205,9 @@ impl Viewer {
             Action::EyeDome => self.settings.look.eye_dome ^= true,
             Action::Record => match self.recorder {
                 Some(_) => self.stop_recording(),
+                None if self.export.is_some() => {
+                    self.warn("The camera is the export's: end that first (Esc)");
+                }
                 None => {
                     self.take_over();
                     self.recorder = Some(Recorder::start(&self.camera, Instant::now()));

@@ -596,6 +596,7 @@ impl Viewer {
 
     /// Plays a path from its begin.
     pub fn play(&mut self, path: CameraPath) {
+        self.recorder = None;
         self.path = Some(path);
         self.player = Some(Player::start(Instant::now()));
     }

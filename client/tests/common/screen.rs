@@ -198,19 +198,32 @@ impl<'a> Window<'a> {
         self.now = self.told.0.lock().unwrap_or_else(PoisonError::into_inner).events.len();
     }
 
-    fn wait_for<T>(&self, what: &str, look: impl Fn(&Told) -> Option<T>) -> T {
-        let end = Instant::now() + PATIENCE;
+    /// Looks at what is told, until something is found or the time is over; what was told by then.
+    fn watch<T>(
+        &self,
+        patience: Duration,
+        what: &str,
+        look: impl Fn(&Told) -> Option<T>,
+    ) -> Result<T, Vec<Value>> {
+        let end = Instant::now() + patience;
         let mut told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
             if let Some(found) = look(&told) {
-                return found;
+                return Ok(found);
             }
             let left = end.saturating_duration_since(Instant::now());
             assert!(!told.is_over, "the window is closed; waited for {what}");
-            assert!(!left.is_zero(), "waited for {what} in vain; told: {:#?}", told.events);
+            if left.is_zero() {
+                return Err(told.events.clone());
+            }
             let waited = self.told.1.wait_timeout(told, left);
             told = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
+    }
+
+    fn wait_for<T>(&self, what: &str, look: impl Fn(&Told) -> Option<T>) -> T {
+        let found = self.watch(PATIENCE, what, look);
+        found.unwrap_or_else(|told| panic!("waited for {what} in vain; told: {told:#?}"))
     }
 
     /// Waits for an event.
@@ -310,21 +323,11 @@ impl<'a> Window<'a> {
 
     /// Waits a while until the window tells that it took a click on a widget.
     fn is_clicked(&self, role: &str, label: &str) -> bool {
-        let end = Instant::now() + CLICK;
-        let mut told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
-        loop {
-            let mut news = told.events.iter().skip(self.now);
-            let is_it = |event: &Value| event["role"] == role && event["label"] == label;
-            if news.any(|event| event["event"] == "clicked" && is_it(event)) {
-                return true;
-            }
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return false;
-            }
-            let waited = self.told.1.wait_timeout(told, left);
-            told = waited.unwrap_or_else(PoisonError::into_inner).0;
-        }
+        let is_it = |event: &Value| {
+            event["event"] == "clicked" && event["role"] == role && event["label"] == label
+        };
+        let click = |told: &Told| told.events.iter().skip(self.now).any(is_it).then_some(());
+        self.watch(CLICK, "a click", click).is_ok()
     }
 
     /// Chooses an entry of a list that folds out. Where another list is still folding in, the first click

@@ -164,3 +164,34 @@ fn a_servers_list_is_shown_and_opened_from() {
     window.settled();
     window.close();
 }
+
+#[test]
+fn what_is_no_session_is_not_written_over_and_what_is_missing_stays_in_one() {
+    if is_without_gpu() {
+        return;
+    }
+    let world = World::of("sim:courtyard?points=2k&seed=3");
+    let path = world.file("path.json");
+    std::fs::write(&path, r#"{"format":"lodestream-path"}"#).expect("written");
+    let session = world.file("session.json");
+    let text = r#"{"format":"lodestream-session","version":1,"clouds":[
+        {"source":"courtyard.lods"},{"source":"/no/such.lods","hidden_classes":[7]}]}"#;
+    std::fs::write(&session, text).expect("written");
+    let screen = Screen::new(640, 480);
+    let folder = world.file("out");
+    let arguments = ["--settings", "-", "--folder", &folder, "--size", "640x480"];
+    for file in [&path, &session] {
+        let mut window =
+            Window::open(&screen, PROGRAM, &[&["--session", file], &arguments[..]].concat());
+        window.wait("message", |event| event["warning"] == true);
+        window.keys(&["Escape", "ctrl+s"]);
+        window.wait("session", |event| event["saved"].is_string());
+        window.close();
+    }
+    let read = |file: &str| std::fs::read_to_string(file).expect("there");
+    assert_eq!(read(&path), r#"{"format":"lodestream-path"}"#);
+    let kept: serde_json::Value = serde_json::from_str(&read(&session)).expect("JSON");
+    assert_eq!(kept["clouds"][0]["source"], "courtyard.lods", "as it lies beside the session");
+    assert_eq!(kept["clouds"][1]["source"], "/no/such.lods");
+    assert_eq!(kept["clouds"][1]["hidden_classes"][0], 7);
+}

@@ -282,6 +282,7 @@ impl From<Failure> for io::Error {
 fn told(error: &StoreError) -> String {
     error.to_string().lines().map(str::trim).collect::<Vec<_>>().join(" ")
 }
+
 /// What the store says is for the log: it has addresses and more that clients need not know.
 fn unanswered(name: &str, failure: &Failure) -> OpenError {
     tracing::warn!("{name:?}: {failure}");

@@ -108,6 +108,25 @@ fn connections_of_http2_end_where_nothing_is_asked_or_taken() {
     stalled.get(1, "/a.lods").expect("the server reads");
     while stalled.next().is_some() {}
     assert_eq!(stalled.data_bytes, 0);
+
+    // The same, however much it asks for and takes besides.
+    let mut busy = FrameClient::connect(server.addr(), 0);
+    busy.get(1, "/a.lods").expect("the server reads");
+    for id in (3..).step_by(2) {
+        assert!(id < 600, "it is kept though one response is not taken");
+        if busy.get(id, "/healthz").and_then(|()| busy.allow(id, 1000)).is_err() {
+            break;
+        }
+        let before = busy.data_bytes;
+        let mut is_over = false;
+        while busy.data_bytes == before && !is_over {
+            is_over = busy.next().is_none_or(|kind| kind == GOAWAY);
+        }
+        if is_over {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
 }
 
 #[test]

@@ -16,7 +16,7 @@ use crate::stability::{
 const REFERENCE: &str = "the file's decimals as fractions of 512 bits";
 const ROUNDINGS: &str = "three roundings of a double of that size: the scale, the product, the sum";
 const HALF_A_STEP: &str =
-    "half a lattice step, which the build tells, and the double's own rounding";
+    "half the step that is written down for the case, and the double's own rounding";
 
 /// Of coordinates that are taken for decimal numbers.
 const MOST_DECIMALS: u32 = 9;
