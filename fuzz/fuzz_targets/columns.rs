@@ -7,13 +7,17 @@ use lodestream_protocol::{
     Domain, Fine, GroupInfo, Manifest, Node, decode_unchecked, encode_column,
 };
 
-/// The same bytes, as where the points lie in their cells.
-fn fine_positions(manifest: &Manifest, node: &Node, payload: &[u8]) {
+/// The same bytes, as where the points lie in their cells and what their colours lack.
+fn fine_parts(manifest: &Manifest, node: &Node, payload: &[u8]) {
     let mut manifest = manifest.clone();
     let group = manifest.groups.len();
-    manifest.groups.push(GroupInfo { name: "fine".into(), columns: vec![0] });
-    manifest.fine = Some(Fine { group, cells_per_spacing: 2 });
+    manifest.groups.push(GroupInfo { name: "fine".into(), columns: vec![0, 0] });
+    manifest.fine = Some(Fine { group, color: true, cells_per_spacing: 2 });
     let Ok(decoded) = decode_unchecked(&manifest, group, node, payload) else { return };
+    if let Some(colors) = decoded.fine_colors {
+        let bytes = manifest.attributes[colors.attribute].value_bytes() * node.points as usize;
+        colors.refine(&mut vec![0; bytes]).expect("as many as the node has");
+    }
     let Some(fine) = decoded.fine else { return };
     assert_eq!(fine.offsets.len(), node.points as usize);
     let inside = |q: &[u32; 3]| q.iter().all(|&v| u64::from(v) >> fine.cell_bits == 0);
@@ -22,7 +26,7 @@ fn fine_positions(manifest: &Manifest, node: &Node, payload: &[u8]) {
 
 fuzz_target!(|data: &[u8]| {
     let Some(ColumnsInput { manifest, node, payload }) = ColumnsInput::parse(data) else { return };
-    fine_positions(&manifest, &node, payload);
+    fine_parts(&manifest, &node, payload);
     let Ok(decoded) = decode_unchecked(&manifest, 0, &node, payload) else { return };
     let count = node.points as usize;
     assert_eq!(decoded.positions.len(), count);

@@ -8,6 +8,7 @@ use crate::{leaf, manifest};
 
 const TEXEL: u8 = 1 << 7;
 const TEXTURE_SIZE: u8 = 1 << 6;
+const COLOR: u8 = 1 << 5;
 const SCALAR_MASK: u8 = 0b1111;
 /// More elements only make a run slower: no decoder behaves differently beyond.
 const MAX_POINTS: u32 = 1 << 18;
@@ -15,7 +16,7 @@ const MAX_POINTS: u32 = 1 << 18;
 /// A node's payload of group 0 and all that a reader knows about it beforehand.
 ///
 /// Bytes: lattice bits, level, elements (u24), attributes; for each of those a byte with its scalar
-/// type, whether it holds texture sizes and whether it belongs to texels, and a byte with its
+/// type, whether it holds texture sizes or colours and whether it belongs to texels, and a byte with its
 /// components; the payload.
 #[derive(Debug)]
 pub struct ColumnsInput<'a> {
@@ -39,8 +40,9 @@ impl<'a> ColumnsInput<'a> {
             let (&[kind, components], rest) = payload.split_first_chunk()?;
             payload = rest;
             attributes.push(Attribute {
-                name: match kind & TEXTURE_SIZE {
+                name: match kind & (TEXTURE_SIZE | COLOR) {
                     0 => format!("a{index}"),
+                    COLOR => "color".into(),
                     _ => "texture_size".into(),
                 },
                 scalar: ScalarType::ALL[usize::from(kind & SCALAR_MASK) % ScalarType::ALL.len()],
@@ -81,9 +83,13 @@ impl<'a> ColumnsInput<'a> {
             vec![self.manifest.lattice.side_bits, self.node.key.level(), p0, p1, p2, count];
         for attribute in stored {
             let scalar = ScalarType::ALL.iter().position(|s| *s == attribute.scalar)?;
-            let size = if attribute.name == "texture_size" { TEXTURE_SIZE } else { 0 };
+            let name = match attribute.name.as_str() {
+                "texture_size" => TEXTURE_SIZE,
+                "color" => COLOR,
+                _ => 0,
+            };
             let texel = if attribute.domain == Domain::Texel { TEXEL } else { 0 };
-            bytes.push(u8::try_from(scalar).ok()? | size | texel);
+            bytes.push(u8::try_from(scalar).ok()? | name | texel);
             bytes.push(attribute.components);
         }
         bytes.extend_from_slice(self.payload);

@@ -2,7 +2,8 @@
 
 use lodestream_protocol::{
     Attribute, Domain, Error as FormatError, GroupInfo, LatticeBox, Manifest, MortonCode, NodeKey,
-    NormalCone, ScalarType, encode_cells, encode_column, encode_fine_positions, encode_positions,
+    NormalCone, ScalarType, encode_cells, encode_colors, encode_column, encode_fine_positions,
+    encode_positions, is_partable_color,
 };
 
 use crate::{cones::NormalColumn, readers::InputAttribute, schema::Schema};
@@ -16,8 +17,10 @@ pub struct Layout {
     pub offsets: Vec<usize>,
     /// The manifest's groups; bytes are filled in at the end.
     pub groups: Vec<GroupInfo>,
-    /// The group of fine positions, where positions are stored in two parts.
+    /// The group of fine positions and colours, where these are stored in two parts.
     pub fine: Option<usize>,
+    /// The attribute of the colours that are stored in two parts.
+    pub fine_color: Option<usize>,
     /// Bytes of a cut row: what varies.
     pub row_bytes: usize,
     /// Where the normals are in a cut row, if there are any and they vary.
@@ -99,11 +102,24 @@ impl Layout {
         let normal =
             attributes.iter().zip(&offsets).find(|(a, _)| a.is_normal() && a.group().is_some());
         let normal = normal.map(|(a, &offset)| NormalColumn { offset, scalar: a.scalar });
-        let store_row_bytes = schema.row_bytes;
-        Self { attributes, offsets, groups, fine, row_bytes, normal, kept, store_row_bytes }
+        let fine_color = fine.and_then(|_| attributes.iter().position(is_partable_color));
+        if let (Some(fine), Some(_)) = (fine, fine_color) {
+            groups[fine].columns.push(0);
+        }
+        Self {
+            attributes,
+            offsets,
+            groups,
+            fine,
+            fine_color,
+            row_bytes,
+            normal,
+            kept,
+            store_row_bytes: schema.row_bytes,
+        }
     }
 
-    /// The columns of a dataset, positions in one part; rows hold what is stored.
+    /// The columns of a dataset, positions and colours in one part; rows hold what is stored.
     pub fn of(manifest: &Manifest) -> Self {
         let mut row_bytes = 0;
         let offsets = manifest.attributes.iter().map(|attribute| {
@@ -117,6 +133,7 @@ impl Layout {
             offsets,
             groups: manifest.groups.clone(),
             fine: None,
+            fine_color: None,
             row_bytes,
             normal: None,
             kept: Vec::new(),
@@ -156,6 +173,8 @@ pub struct Ranges {
     pub column_bytes: Vec<u64>,
     /// Encoded bytes of fine positions.
     pub fine_bytes: u64,
+    /// Encoded bytes of fine colours.
+    pub fine_color_bytes: u64,
 }
 
 impl Ranges {
@@ -165,7 +184,7 @@ impl Ranges {
         let components =
             layout.attributes.iter().map(|a| vec![none; usize::from(a.components)]).collect();
         let column_bytes = vec![0; layout.attributes.len() + 1];
-        Self { components, column_bytes, fine_bytes: 0 }
+        Self { components, column_bytes, fine_bytes: 0, fine_color_bytes: 0 }
     }
 
     /// Takes in another part's ranges.
@@ -178,6 +197,7 @@ impl Ranges {
             *a += b;
         }
         self.fine_bytes += other.fine_bytes;
+        self.fine_color_bytes += other.fine_color_bytes;
     }
 
     /// Tells the manifest the ranges and the bytes of its columns.
@@ -188,7 +208,9 @@ impl Ranges {
         let columns = manifest.attributes.iter().map(Attribute::group);
         let columns = std::iter::once(Some(0)).chain(columns).zip(&self.column_bytes);
         let fine = manifest.fine.map(|fine| (Some(fine.group), &self.fine_bytes));
-        let columns = columns.chain(fine);
+        let fine_color = manifest.fine.filter(|fine| fine.color);
+        let fine_color = fine_color.map(|fine| (Some(fine.group), &self.fine_color_bytes));
+        let columns = columns.chain(fine).chain(fine_color);
         for (index, group) in manifest.groups.iter_mut().enumerate() {
             let own = columns.clone().filter(|(group, _)| *group == Some(index));
             group.columns = own.map(|(_, &bytes)| bytes).collect();
@@ -315,10 +337,17 @@ impl<'a> NodeEncoder<'a> {
             let (offset, len) = (self.layout.offsets[index], attribute.value_bytes());
             gather(&self.rows, self.layout.row_bytes, offset, len, &mut self.values);
             self.ranges.grow(index, attribute.scalar, &self.values);
-            let buffer = &mut self.buffers[group];
-            let before = buffer.len();
-            encode_column(buffer, attribute, &self.values)?;
-            self.ranges.column_bytes[index + 1] += (buffer.len() - before) as u64;
+            let before = self.buffers[group].len();
+            if let Some(fine) = self.layout.fine.filter(|_| self.layout.fine_color == Some(index))
+                && let Ok([coarse, fine]) = self.buffers.get_disjoint_mut([group, fine])
+            {
+                let fine_before = fine.len();
+                encode_colors(coarse, fine, attribute, &self.values)?;
+                self.ranges.fine_color_bytes += (fine.len() - fine_before) as u64;
+            } else {
+                encode_column(&mut self.buffers[group], attribute, &self.values)?;
+            }
+            self.ranges.column_bytes[index + 1] += (self.buffers[group].len() - before) as u64;
         }
         let payloads = self.buffers.iter().zip(starts).map(|(buffer, start)| {
             let payload = &buffer[start..];

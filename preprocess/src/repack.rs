@@ -1,4 +1,4 @@
-//! A dataset's twin whose positions are stored in one part: what streaming it in the usual way costs.
+//! A dataset's twin whose positions and colours are stored in one part: what streaming it in the usual way costs.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::{
     error::{Error, Result},
 };
 
-/// Writes a dataset of the same nodes, points and columns to `output`, positions in one part. Holds the
+/// Writes a dataset of the same nodes, points and columns to `output`, positions and colours in one part. Holds the
 /// encoded payloads in memory.
 ///
 /// # Errors

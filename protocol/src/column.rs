@@ -1,7 +1,7 @@
 //! Columns: a node's values, and their encodings.
 //!
 //! The payload of a node and a group is its columns one after the other, each a byte of encoding,
-//! a length and the data. Group 0 starts with the positions. Values are lossless always.
+//! a length and the data. Group 0 starts with the positions. All parts together are lossless.
 //!
 //! Numbers go through `pco`: on aerial scans it packs Morton deltas to 3.1 bytes a point and
 //! decodes at several hundred million values a second a core, ahead of zstd and bit-packing on both.
@@ -14,6 +14,7 @@ use pco::{
 
 use crate::{
     attribute::{Attribute, Domain, ScalarType},
+    color::{FineColors, decode_coarse_colors, decode_fine_colors},
     error::{Error, Result, corrupt},
     hierarchy::{MAX_NODE_POINTS, Node},
     manifest::Manifest,
@@ -44,6 +45,11 @@ pub enum Encoding {
     /// A byte `s`, and the lowest `3s` bits of the Morton codes: one pco stream of u16 (`s` up to 5),
     /// u32 (up to 10) or u64 (up to 21), else two as in [`MortonWide`](Self::MortonWide).
     FinePositions = 7,
+    /// Colours to their highest bits: how they are parted, and three pco streams of i32. See
+    /// [`encode_colors`](crate::encode_colors).
+    CoarseColor = 8,
+    /// What these lack: how they are parted, and three pco streams of i32.
+    FineColor = 9,
 }
 
 impl Encoding {
@@ -57,6 +63,8 @@ impl Encoding {
             5 => Self::MortonWide,
             6 => Self::Cells,
             7 => Self::FinePositions,
+            8 => Self::CoarseColor,
+            9 => Self::FineColor,
             other => return Err(corrupt("column", format!("unknown encoding {other}"))),
         })
     }
@@ -87,6 +95,8 @@ pub struct DecodedGroup {
     pub cell_bits: u8,
     /// For the group of [`Fine`](crate::Fine) positions, where the node has any.
     pub fine: Option<FinePositions>,
+    /// For that group, where group 0 has coarse colours of the node.
+    pub fine_colors: Option<FineColors>,
     /// One per attribute of the group, in the manifest's order.
     pub columns: Vec<Column>,
 }
@@ -277,7 +287,11 @@ pub(crate) fn check_used(data: &[u8]) -> Result<()> {
     if data.is_empty() { Ok(()) } else { Err(corrupt("column", "bytes are left over")) }
 }
 
-fn decode_column(bytes: &mut &[u8], attribute: &Attribute, count: usize) -> Result<Vec<u8>> {
+pub(crate) fn decode_column(
+    bytes: &mut &[u8],
+    attribute: &Attribute,
+    count: usize,
+) -> Result<Vec<u8>> {
     let (encoding, mut data) = take_column(bytes)?;
     let components = usize::from(attribute.components);
     let values = match encoding {
@@ -291,6 +305,9 @@ fn decode_column(bytes: &mut &[u8], attribute: &Attribute, count: usize) -> Resu
             ScalarType::U16 => decode_color::<u16>(&mut data, count, u16::wrapping_add)?,
             other => return Err(corrupt("column", format!("colour of {other:?}"))),
         },
+        Encoding::CoarseColor if components == 3 => {
+            decode_coarse_colors(&mut data, attribute.scalar, count)?
+        }
         other => {
             return Err(corrupt("column", format!("{}: encoding {other:?}", attribute.name)));
         }
@@ -391,12 +408,17 @@ pub fn decode_unchecked(
     let bits = manifest.lattice.node_bits(node.key.level());
     if group == 0 {
         (decoded.positions, decoded.cell_bits) = decode_positions(&mut payload, count, bits)?;
-    } else if manifest.fine.is_some_and(|fine| fine.group == group) {
-        if payload.is_empty() {
-            // The cells are the positions.
-            return Ok(decoded);
+    } else if let Some(fine) = manifest.fine.filter(|fine| fine.group == group) {
+        // What group 0 tells whole has no second part.
+        if payload.first() == Some(&(Encoding::FinePositions as u8)) {
+            decoded.fine = Some(decode_fine_positions(&mut payload, count, bits)?);
         }
-        decoded.fine = Some(decode_fine_positions(&mut payload, count, bits)?);
+        if let Some(index) = manifest.fine_color(fine)
+            && !payload.is_empty()
+        {
+            let color = &manifest.attributes[index];
+            decoded.fine_colors = Some(decode_fine_colors(&mut payload, color, index, count)?);
+        }
     }
     let mut texels = 0;
     for (index, attribute) in manifest.attributes.iter().enumerate() {

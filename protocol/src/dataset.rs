@@ -34,7 +34,7 @@ pub struct NodePoints {
     pub positions: Vec<[u32; 3]>,
     /// log2 of the side of these cells in lattice units; 0 where the positions are whole.
     pub cell_bits: u8,
-    /// Columns of the groups that were read, in the manifest's order.
+    /// Columns of the groups that were read, in the manifest's order; colours as coarse as the positions.
     pub columns: Vec<Column>,
 }
 
@@ -54,7 +54,7 @@ impl NodePoints {
     /// Takes in a group; group 0 comes before fine positions.
     ///
     /// # Errors
-    /// [`Error::Corrupt`] where there are fine positions, but not of these points.
+    /// [`Error::Corrupt`] where there are fine positions or colours, but not of these points.
     pub fn add(&mut self, group: DecodedGroup) -> Result<()> {
         if !group.positions.is_empty() {
             (self.positions, self.cell_bits) = (group.positions, group.cell_bits);
@@ -62,6 +62,12 @@ impl NodePoints {
         if let Some(fine) = group.fine {
             fine.refine(&mut self.positions)?;
             self.cell_bits = 0;
+        }
+        if let Some(fine) = group.fine_colors {
+            let coarse = self.columns.iter_mut().find(|c| c.attribute == fine.attribute);
+            let coarse =
+                coarse.ok_or_else(|| corrupt("column", "fine colours before coarse ones"))?;
+            fine.refine(&mut coarse.bytes)?;
         }
         self.columns.extend(group.columns);
         self.columns.sort_by_key(|column| column.attribute);

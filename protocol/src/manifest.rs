@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     attribute::{Attribute, Domain},
+    color::is_partable_color,
     error::{Result, corrupt},
     hierarchy::BOUNDS_BITS,
     lattice::{Lattice, LatticeBox},
@@ -79,11 +80,15 @@ impl GroupInfo {
     }
 }
 
-/// Positions in two parts: cells in group 0, the rest in a group of its own.
+/// Positions, and colours, in two parts: cells and coarse colours in group 0, the rest in a group of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fine {
-    /// The group that says where in their cells the points lie. It has no other columns.
+    /// The group that says where in their cells the points lie, and what coarse colours lack. It has no
+    /// other columns.
     pub group: usize,
+    /// Whether `color` is in two parts, too.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub color: bool,
     /// The side of a node's cells is the largest power of two of lattice units that is at most its
     /// spacing over this.
     pub cells_per_spacing: u32,
@@ -125,7 +130,7 @@ pub struct Manifest {
     pub attributes: Vec<Attribute>,
     /// Column groups; group 0 always exists and starts with the position column.
     pub groups: Vec<GroupInfo>,
-    /// Where positions are stored in two parts.
+    /// Where positions and colours are stored in two parts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fine: Option<Fine>,
     /// Coordinate reference system as the source gives it (WKT), if it does.
@@ -204,10 +209,12 @@ impl Manifest {
         }
         for (index, group) in self.groups.iter().enumerate() {
             let is_fine = self.fine.is_some_and(|fine| fine.group == index);
-            let columns = usize::from(index == 0 || is_fine) + self.columns_of(index).count();
-            if is_fine && columns > 1 {
+            let fine_color = is_fine && self.fine.is_some_and(|fine| fine.color);
+            let attributes = self.columns_of(index).count();
+            if is_fine && attributes > 0 {
                 return bad(format!("group {} of fine positions has attributes", group.name));
             }
+            let columns = usize::from(index == 0 || is_fine) + usize::from(fine_color) + attributes;
             if group.columns.len() != columns {
                 return bad(format!(
                     "group {} tells the bytes of {} columns, it has {columns}",
@@ -216,7 +223,13 @@ impl Manifest {
                 ));
             }
         }
-        if let Some(Fine { group, cells_per_spacing }) = self.fine
+        if let Some(fine) = self.fine
+            && fine.color
+            && self.fine_color(fine).is_none()
+        {
+            return bad("fine colours of what is no colour in group 0".into());
+        }
+        if let Some(Fine { group, cells_per_spacing, .. }) = self.fine
             && (group == 0 || group >= self.groups.len() || cells_per_spacing == 0)
         {
             let why = format!("group {group}, {cells_per_spacing} cells a spacing");
@@ -237,6 +250,12 @@ impl Manifest {
     #[must_use]
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
         self.attributes.iter().find(|a| a.name == name)
+    }
+
+    /// Index of the colours that are stored in two parts.
+    #[must_use]
+    pub fn fine_color(&self, fine: Fine) -> Option<usize> {
+        self.attributes.iter().position(is_partable_color).filter(|_| fine.color)
     }
 
     /// Attributes stored as columns of `group`, in column order.
@@ -319,6 +338,34 @@ mod tests {
             let error = manifest.to_json().expect_err("refused").to_string();
             assert!(error.contains("tells the bytes of"), "{error}");
         }
+    }
+
+    #[test]
+    fn colours_in_two_parts_are_colours_of_group_0() {
+        let with = |name: &str, scalar, group| {
+            let mut manifest = manifest();
+            let attribute = &mut manifest.attributes[0];
+            (attribute.name, attribute.scalar, attribute.components) = (name.into(), scalar, 3);
+            attribute.storage = Storage::Column { group };
+            manifest.groups[0].columns = vec![7; 2 - group];
+            manifest.groups[1] = GroupInfo { name: "fine".into(), columns: vec![8, 9] };
+            manifest.fine = Some(Fine { group: 1, color: true, cells_per_spacing: 8 });
+            manifest.to_json()
+        };
+        assert!(
+            with("color", ScalarType::U16, 0).is_ok() && with("color", ScalarType::U8, 0).is_ok()
+        );
+        for (name, scalar, group) in [
+            ("colour", ScalarType::U16, 0),
+            ("color", ScalarType::F32, 0),
+            ("color", ScalarType::U16, 1),
+        ] {
+            let error = with(name, scalar, group).expect_err("refused").to_string();
+            assert!(error.contains("fine"), "{error}");
+        }
+        let mut manifest = manifest();
+        manifest.groups[1].columns = vec![8, 9];
+        assert!(manifest.to_json().is_err(), "two columns of one attribute");
     }
 
     #[test]

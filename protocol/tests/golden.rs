@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use lodestream_protocol::{
     Attribute, Boot, Dataset, Domain, Error, Fine, GroupInfo, HierarchyPage, Lattice, LatticeBox,
     Manifest, Method, Node, NodeKey, NodePoints, NormalCone, PageRef, PayloadRef, Primitive,
-    ReadAt, Refinement, ScalarType, SourceInfo, Storage, decode_group, encode_cells, encode_column,
-    encode_fine_positions, encode_positions, morton_encode,
+    ReadAt, Refinement, ScalarType, SourceInfo, Storage, decode_group, encode_cells, encode_colors,
+    encode_column, encode_fine_positions, encode_positions, morton_encode,
 };
 
 fn attribute(name: &str, scalar: ScalarType, components: u8, group: usize) -> Attribute {
@@ -89,7 +89,7 @@ fn dataset(primitive: Primitive, refinement: Refinement, stored: Positions) -> V
     // Cells need a root of more than 256 lattice units.
     let (fine, finer) = match stored {
         Positions::Whole => (None, 0),
-        Positions::Cells => (Some(Fine { group: last + 1, cells_per_spacing: 2 }), 8),
+        Positions::Cells => (Some(Fine { group: last + 1, color: false, cells_per_spacing: 2 }), 8),
     };
     let groups = 1 + last + usize::from(fine.is_some());
     let lattice = Lattice {
@@ -233,6 +233,35 @@ fn every_primitive_and_refinement_keeps_its_bytes() {
         let golden = std::fs::read(&path).expect("golden file is committed");
         assert!(golden == bytes, "{name}: the encoder no longer writes the golden bytes");
     }
+}
+
+/// Colours of 8 bits, as they are and as LAS has them, in two parts.
+#[test]
+fn colours_in_two_parts_keep_their_bytes() {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden/colors.columns");
+    let mut bytes = Vec::new();
+    for step in [1u16, 257] {
+        let colors = (0..300u16).flat_map(|i| [i * 7 % 256, i % 256, 255 - i / 2]);
+        let values: Vec<u8> = colors.flat_map(|c| (c * step).to_le_bytes()).collect();
+        let color = Attribute {
+            name: "color".into(),
+            scalar: ScalarType::U16,
+            components: 3,
+            domain: Domain::Element,
+            storage: Storage::Column { group: 0 },
+            min: vec![],
+            max: vec![],
+        };
+        let mut fine = Vec::new();
+        encode_colors(&mut bytes, &mut fine, &color, &values).expect("encodes");
+        assert!(!fine.is_empty());
+        bytes.append(&mut fine);
+    }
+    if std::env::var_os("LODESTREAM_WRITE_GOLDEN").is_some() {
+        std::fs::write(&path, &bytes).expect("writes");
+    }
+    let golden = std::fs::read(&path).expect("golden file is committed");
+    assert!(golden == bytes, "the encoder no longer writes the golden bytes");
 }
 
 #[test]

@@ -105,7 +105,7 @@ pub struct UnreadableEntry {
 #[derive(Debug, Default)]
 pub(crate) struct IndexCache {
     /// Held while the list is made: who comes meanwhile waits, and finds it all here.
-    entries: Mutex<HashMap<String, Known>>,
+    entries: Arc<Mutex<HashMap<String, Known>>>,
 }
 
 /// An entry, and what it was made from.
@@ -118,19 +118,23 @@ struct Known {
 impl IndexCache {
     /// Reads the list.
     pub(crate) async fn read(&self, storage: &Arc<Storage>) -> io::Result<DatasetIndex> {
-        let mut entries = self.entries.lock().await;
-        let listing = storage.list().await?;
-        let known = std::mem::take(&mut *entries);
-        let is_still = |name: &&String| {
-            known.get(*name).is_some_and(|known| listing.is_still(name, &known.identity))
-        };
-        let new: Vec<_> = listing.datasets.iter().filter(|name| !is_still(name)).cloned().collect();
-        storage.warm(&new).await;
+        let mut entries = Arc::clone(&self.entries).lock_owned().await;
         let storage = Arc::clone(storage);
-        let looking = tokio::task::spawn_blocking(move || look(&storage, &listing, known));
-        let (index, known) = looking.await.map_err(io::Error::other)?;
-        *entries = known;
-        Ok(index)
+        // In a task of its own: who asked may go away, and what was found is for the next as well.
+        let making = tokio::spawn(async move {
+            let listing = storage.list().await?;
+            let known = std::mem::take(&mut *entries);
+            let is_still = |name: &&String| {
+                known.get(*name).is_some_and(|known| listing.is_still(name, &known.identity))
+            };
+            let new = listing.datasets.iter().filter(|name| !is_still(name));
+            storage.warm(&new.cloned().collect::<Vec<_>>()).await;
+            let looking = tokio::task::spawn_blocking(move || look(&storage, &listing, known));
+            let (index, known) = looking.await.map_err(io::Error::other)?;
+            *entries = known;
+            Ok(index)
+        });
+        making.await.map_err(io::Error::other)?
     }
 }
 

@@ -1,13 +1,13 @@
 //! Every request is counted, and logged where the operator wants that.
 //!
 //! Both happen when the response ends, not when it begins: only then is known how many bytes the
-//! client took. A log line has the path and the client's address; it never has the query, which may
+//! client took. Whose client goes away before it begins has the status 499, as nginx has it. A log line has the path and the client's address; it never has the query, which may
 //! hold a signature, nor the `Authorization` field.
 
 use std::{
     net::IpAddr,
     pin::Pin,
-    sync::Arc,
+    sync::{Arc, LazyLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
@@ -37,6 +37,10 @@ pub(crate) struct ServedDataset(pub(crate) String);
 #[derive(Debug, Clone)]
 pub(crate) struct Holder(pub(crate) String);
 
+/// The status of a request whose client does not wait for the response.
+static CLIENT_CLOSED: LazyLock<StatusCode> =
+    LazyLock::new(|| StatusCode::from_u16(499).expect("three digits"));
+
 /// Counts and logs.
 pub(crate) async fn observe(
     State(site): State<Arc<Site>>,
@@ -48,23 +52,26 @@ pub(crate) async fn observe(
     let kind = Kind::of(route.as_ref().map(MatchedPath::as_str));
     let is_head = request.method() == Method::HEAD;
     let entry = site.access_log.then(|| Entry::of(&site, &request));
-    let mut response = next.run(request).await;
-    let extensions = response.extensions_mut();
-    let dataset = extensions.remove().map_or_else(String::new, |ServedDataset(name)| name);
-    let holder = extensions.remove().map(|Holder(name)| name);
-    let record = Record {
+    let mut record = Record {
         site,
         entry,
         kind,
-        dataset,
-        holder,
-        status: response.status(),
+        dataset: String::new(),
+        holder: None,
+        status: *CLIENT_CLOSED,
         bytes: 0,
         start,
-        until_first_byte: start.elapsed(),
-        // A body of nothing is never looked at, nor is what `HEAD` leaves out.
-        is_whole: is_head || response.body().is_end_stream(),
+        until_first_byte: None,
+        is_whole: false,
     };
+    let mut response = next.run(request).await;
+    let extensions = response.extensions_mut();
+    record.dataset = extensions.remove().map_or_else(String::new, |ServedDataset(name)| name);
+    record.holder = extensions.remove().map(|Holder(name)| name);
+    record.status = response.status();
+    record.until_first_byte = Some(start.elapsed());
+    // A body of nothing is never looked at, nor is what `HEAD` leaves out.
+    record.is_whole = is_head || response.body().is_end_stream();
     response.map(|body| Body::new(ObservedBody { inner: body, record }))
 }
 
@@ -103,19 +110,20 @@ struct Record {
     status: StatusCode,
     bytes: u64,
     start: Instant,
-    until_first_byte: Duration,
+    until_first_byte: Option<Duration>,
     is_whole: bool,
 }
 
 impl Drop for Record {
     fn drop(&mut self) {
         let until_last_byte = self.start.elapsed();
+        let until_first_byte = self.until_first_byte.unwrap_or(until_last_byte);
         self.site.metrics.count(&Answered {
             dataset: &self.dataset,
             kind: self.kind,
             status: self.status.as_u16(),
             bytes: self.bytes,
-            until_first_byte: self.until_first_byte,
+            until_first_byte,
             until_last_byte,
             is_whole: self.is_whole,
         });
@@ -130,7 +138,7 @@ impl Drop for Record {
             range = entry.range.as_ref().and_then(|value| value.to_str().ok()),
             status = self.status.as_u16(),
             bytes = self.bytes,
-            first_byte_ms = ms(self.until_first_byte),
+            first_byte_ms = ms(until_first_byte),
             last_byte_ms = ms(until_last_byte),
             kind = self.kind.name(),
             token = self.holder.as_deref(),
@@ -172,5 +180,33 @@ impl HttpBody for ObservedBody {
 
     fn size_hint(&self) -> SizeHint {
         self.inner.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{future::pending, net::SocketAddr};
+
+    use axum::{Router, middleware::from_fn_with_state, routing::get};
+    use hyper::service::Service;
+    use hyper_util::service::TowerToHyperService;
+
+    use super::*;
+    use crate::ServeConfig;
+
+    #[tokio::test]
+    async fn who_goes_away_before_the_response_is_counted() {
+        let folder = tempfile::tempdir().expect("temporary");
+        let config = ServeConfig::new(folder.path(), SocketAddr::from(([127, 0, 0, 1], 0)));
+        let site = Site::open(&config).expect("a folder");
+        let router = Router::new()
+            .route("/healthz", get(pending::<()>))
+            .layer(from_fn_with_state(Arc::clone(&site), observe));
+        let request = Request::get("/healthz").body(Body::empty()).expect("a request");
+        let answer = TowerToHyperService::new(router).call(request);
+        let waiting = tokio::time::timeout(Duration::from_millis(10), answer);
+        assert!(waiting.await.is_err(), "never answered");
+        let figures = site.metrics.render();
+        assert!(figures.contains("status=\"499\"} 1"), "{figures}");
     }
 }

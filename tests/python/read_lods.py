@@ -71,6 +71,8 @@ def read_index(file):
     with_positions = (0, fine_group)
     groups = range(len(manifest["groups"]))
     sizes = [[0] * (int(group in with_positions) + len(group_columns(manifest, group))) for group in groups]
+    if fine_group is not None and manifest["fine"].get("color"):
+        sizes[fine_group].append(0)
     return Index(manifest, root_page, end, content_id.hex(), sizes)
 
 
@@ -232,10 +234,30 @@ def read_values(encoding, data, dtype, components, count):
         require(components == 3 and dtype in ("<u1", "<u2"), "only three u8 or u16 can be a colour")
         (middle, low, high) = (stream(column, dtype, count) for _ in range(3))
         values = np.stack([middle + low, middle, middle + high], axis=1)  # wraps, as it should
+    elif encoding == 8:
+        require(components == 3 and dtype in ("<u1", "<u2"), "only three u8 or u16 can be a colour")
+        (step, most, *low_bits) = struct.unpack("<HH3B", column.take(7))
+        require(0 < step * max(most, 1) <= np.iinfo(dtype).max, "colours are larger than their type")
+        require(max(low_bits) <= 16, "colours lack more bits than they have")
+        told = [stream(column, "<i4", count).astype(np.int64) for _ in range(3)]
+        (middle, low, high) = ((v << bits) + (1 << bits) // 2 for v, bits in zip(told, low_bits))
+        shown = np.stack([middle + low, middle, middle + high], axis=1)
+        values = (np.clip(shown, 0, most) * step).astype(dtype)
     else:
         raise ValueError(f"encoding {encoding} is not one of an attribute")
     column.finish()
     return values
+
+
+def read_fine_colors(encoding, data, coarse):
+    """The exact colours: what coarse ones lack is added, modulo the width of a channel."""
+    require(encoding == 9, f"encoding {encoding} is not one of fine colours")
+    column = Cursor(data)
+    (step,) = struct.unpack("<H", column.take(2))
+    (middle, low, high) = (stream(column, "<i4", len(coarse)).astype(np.int64) for _ in range(3))
+    column.finish()
+    missing = np.stack([middle + low, middle, middle + high], axis=1) * step
+    return (coarse.astype(np.int64) + missing).astype(coarse.dtype)
 
 
 def read_positions(encoding, data, count):
@@ -308,9 +330,10 @@ def read_node(file, index, node):
     values = {}
     texels = 0
     cell_bits = 0
+    coarse_color = False
     fine_group = manifest["fine"]["group"] if "fine" in manifest else None
     for group, (offset, length, crc) in enumerate(node.payloads):
-        expected = bool(node.points) and (group != fine_group or cell_bits > 0)
+        expected = bool(node.points) and (group != fine_group or cell_bits > 0 or coarse_color)
         require(bool(length) == expected, "a payload without elements, or elements without a payload")
         payload = Cursor(read_bytes(file, index.end + offset, length, crc, "a payload"))
         sizes = index.column_bytes[group]
@@ -318,16 +341,22 @@ def read_node(file, index, node):
             (positions, cell_bits) = read_positions(*take_column(payload), node.points)
             require(not cell_bits or cell_bits == cell_bits_of(manifest, node), "cells are not as large as they should be")
             sizes[0] += payload.at
-        if group == fine_group and length:
+        if group == fine_group and cell_bits:
             (offsets, fine_bits) = read_fine_positions(*take_column(payload), node.points)
             require(fine_bits == cell_bits, "fine positions are of other cells")
             positions = (positions << np.uint64(cell_bits)) + offsets
             sizes[0] += payload.at
+        if group == fine_group and coarse_color:
+            start = payload.at
+            values["color"] = read_fine_colors(*take_column(payload), values["color"])
+            sizes[1] += payload.at - start
         for i, attribute in enumerate(group_columns(manifest, group), start=int(group == 0)):
             count = texels if is_texel(attribute) else node.points
             start = payload.at
             (encoding, data) = take_column(payload) if length else (1, b"")
             sizes[i] += payload.at - start
+            coarse_color |= length > 0 and encoding == 8
+            require(encoding != 8 or manifest["fine"].get("color") and attribute["name"] == "color", "coarse values are no colour")
             column = read_values(encoding, data, TYPES[attribute["type"]], attribute["components"], count)
             values[attribute["name"]] = column
             if attribute["name"] == "texture_size":

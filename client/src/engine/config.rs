@@ -13,8 +13,8 @@ pub struct EngineConfig {
     /// in pixels. A sampled node's points keep a distance of 1/128 of the cube's side (1/111 of
     /// that radius).
     pub min_size_px: f64,
-    /// Where positions are stored in two parts: the fine part is fetched of nodes whose points lie in
-    /// cells that appear larger than this, in pixels. 0: of all nodes, so that every position is exact.
+    /// Where positions and colours are stored in two parts: the fine part is fetched of nodes whose points lie
+    /// in cells that appear larger than this, in pixels. 0: of all nodes, so that every position and colour is exact.
     pub cell_px: f64,
     /// Whether nodes outside the picture are left out. (Off to measure what that saves.)
     pub culls_outside: bool,

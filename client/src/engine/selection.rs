@@ -277,13 +277,16 @@ impl Walk<'_> {
         self.out.picks.len() - 1
     }
 
-    /// Whether the cells that a node's points lie in are large enough to be seen.
+    /// Whether the cells that a node's points lie in are large enough to be seen. Where its positions are whole,
+    /// but its colours may be coarse: whether its points are as far apart.
     fn shows_cells(&self, manifest: &Manifest, node: &Node, bounds: &WorldBox) -> bool {
+        let Some(fine) = manifest.fine else { return false };
         let cell_bits = manifest.cell_bits(node.key.level(), node.spacing);
-        if cell_bits == 0 {
-            return false;
-        }
-        let cell_world = f64::from(cell_bits).exp2() * manifest.lattice.scale;
+        let cell_world = match (cell_bits, fine.color) {
+            (0, false) => return false,
+            (0, true) => f64::from(node.spacing) / f64::from(fine.cells_per_spacing),
+            (bits, _) => f64::from(bits).exp2() * manifest.lattice.scale,
+        };
         let cell_px = cell_world * self.optics.largest_scale(bounds);
         // Where the numbers are no numbers, too.
         cell_px.partial_cmp(&self.limits.cell_px).is_none_or(Ordering::is_gt)

@@ -86,7 +86,7 @@ const SAVINGS: [Change; 5] = [
         |config, _| config.min_size_px = 0.0,
         |left_out| Some([left_out.small.nodes, left_out.small.points]),
     ),
-    ("positions finer than the pixels", |config, _| config.cell_px = 0.0, |_| None),
+    ("last bits of positions and colors", |config, _| config.cell_px = 0.0, |_| None),
     (
         "over the point budget",
         |config, _| config.point_budget = u64::MAX,

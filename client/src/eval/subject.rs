@@ -86,7 +86,7 @@ impl Subject {
         &self.clouds[0]
     }
 
-    /// Prepares for the rivals' policies: they know no positions in two parts, and fetch of every node a
+    /// Prepares for the rivals' policies: they know no positions and colours in two parts, and fetch of every node a
     /// range that holds all of it. So they fetch from a twin, which is written to `folder`. For one of them
     /// the nodes are weighed in its own encoding; `shown` are the groups that the picture needs.
     ///

@@ -1,17 +1,18 @@
-//! Positions in two parts: cells first, and where in its cell each point lies for those who look closely.
+//! Positions and colours in two parts: cells and coarse colours first, and where in its cell each point lies and the last
+//! bits of its colour for those who look closely.
 
 use std::{path::PathBuf, time::Duration};
 
 use glam::DVec3;
 use lodestream_client::{
     camera::{Camera, Projection},
-    engine::{EngineConfig, FramePlan, SimulatedEngine, View},
+    engine::{DrawNode, EngineConfig, FramePlan, SimulatedEngine, View},
     source::{FileSource, Link, LinkSpec, Source},
 };
 use lodestream_preprocess::{
     BuildConfig, CELLS_PER_SPACING, FileSource as PositionedFile, Method, Progress, build,
 };
-use lodestream_protocol::Dataset;
+use lodestream_protocol::{COARSE_COLOR_BITS, Dataset};
 
 struct Silent;
 
@@ -21,7 +22,8 @@ impl Progress for Silent {
     fn warn(&self, _line: &str) {}
 }
 
-fn scene() -> (tempfile::TempDir, PathBuf) {
+/// A courtyard on a lattice of such steps, in world units.
+fn scene_in_steps(scale: Option<f64>) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let output = folder.path().join("courtyard.lods");
     let config = BuildConfig {
@@ -33,12 +35,16 @@ fn scene() -> (tempfile::TempDir, PathBuf) {
         threads: Some(1),
         drop_attributes: Vec::new(),
         columns: None,
-        scale: None,
+        scale,
         cells_per_spacing: CELLS_PER_SPACING,
         cancel: Default::default(),
     };
     build(&config, &Silent).expect("built");
     (folder, output)
+}
+
+fn scene() -> (tempfile::TempDir, PathBuf) {
+    scene_in_steps(None)
 }
 
 /// What a view shows while it comes in, and the bytes that it takes.
@@ -67,6 +73,11 @@ fn plans(path: &PathBuf, distance: f64, cell_px: f64) -> (Vec<std::sync::Arc<Fra
     }
 }
 
+/// Red, green, blue of every point.
+fn colors(node: &DrawNode) -> &[u8] {
+    &node.points.columns[0].bytes
+}
+
 #[test]
 fn from_afar_cells_are_enough_and_every_point_lies_in_its_own() {
     let (_folder, path) = scene();
@@ -83,6 +94,16 @@ fn from_afar_cells_are_enough_and_every_point_lies_in_its_own() {
             assert_eq!(rough.map(|c| c >> cell_bits), exact.map(|c| c >> cell_bits));
         }
     }
+    // Red and blue are told by their differences from green: half a step of each.
+    const LOW_BITS: u32 = 8 - COARSE_COLOR_BITS as u32;
+    let apart: Vec<u8> = rough
+        .iter()
+        .zip(exact)
+        .flat_map(|(rough, exact)| colors(rough).iter().zip(colors(exact)))
+        .map(|(rough, exact)| rough.abs_diff(*exact))
+        .collect();
+    let most = *apart.iter().max().expect("colours");
+    assert!(most > 0 && u32::from(most) <= 1 << LOW_BITS, "colours are {most} apart");
 }
 
 #[test]
@@ -98,6 +119,7 @@ fn close_by_positions_become_exact_after_everything_is_there_roughly() {
         refined += usize::from(dataset.manifest().cell_bits(node.key.level(), node.spacing) > 0);
         let exact = dataset.read_node(node, &[]).expect("reads");
         assert_eq!(drawn.points.positions, exact.positions, "{}", node.key);
+        assert_eq!(drawn.points.columns, exact.columns, "{}", node.key);
     }
     assert!(refined > 0, "something is close enough");
     let told_exactly = |plan: &FramePlan| {
@@ -109,4 +131,26 @@ fn close_by_positions_become_exact_after_everything_is_there_roughly() {
     };
     let first = plans.iter().find(|plan| told_exactly(plan)).expect("refined in the end");
     assert_eq!(first.nodes.len(), last.len(), "a node was refined before another one was there");
+}
+
+#[test]
+fn close_by_colours_become_exact_where_positions_are_whole_from_the_start() {
+    let (_folder, path) = scene_in_steps(Some(0.5));
+    let dataset = Dataset::open(PositionedFile::open(&path).expect("opens")).expect("a dataset");
+    let nodes = dataset.hierarchy().expect("a tree");
+    let (plans, _) = plans(&path, 0.5, 0.25);
+    let mut refined = 0;
+    for drawn in &plans.last().expect("plans").nodes {
+        let node = nodes.iter().find(|node| node.key == drawn.key).expect("in the tree");
+        assert_eq!(dataset.manifest().cell_bits(node.key.level(), node.spacing), 0);
+        let exact = dataset.read_node(node, &[]).expect("reads");
+        assert_eq!(drawn.points.positions, exact.positions);
+        let mut before = plans.iter().flat_map(|plan| &plan.nodes).filter(|n| n.key == drawn.key);
+        let first = before.next().expect("drawn in the end");
+        if first.points.columns != drawn.points.columns {
+            assert_eq!(drawn.points.columns, exact.columns, "{}", drawn.key);
+            refined += 1;
+        }
+    }
+    assert!(refined > 0, "something is close enough");
 }

@@ -46,7 +46,7 @@ pub struct BuildConfig {
     /// Lattice step in world units; `None`: the inputs' own, or far below the point spacing.
     pub scale: Option<f64>,
     /// Positions are stored in two parts: cells of this part of a node's spacing, and where in its cell
-    /// each point lies. A power of two up to 256; 0: in one part.
+    /// each point lies; and colours in their first bits and the rest. A power of two up to 256; 0: all in one part.
     pub cells_per_spacing: u32,
     /// Set to stop the build.
     pub cancel: Arc<AtomicBool>,

@@ -75,7 +75,8 @@ pub(super) fn plan(job: &Job, read: Read, warnings: &mut Vec<String>) -> Result<
     let constant = constant_attributes(&read.schema, &scan.constant_bytes);
     // Where the root has no cells, no node has.
     let cells = config.cells_per_spacing;
-    let has_fine = cells > 0 && choice.lattice.side_bits > (cells * config.grid).ilog2() as u8;
+    let has_cells = cells > 0 && choice.lattice.side_bits > (cells * config.grid).ilog2() as u8;
+    let has_fine = has_cells || cells > 0 && varies(&read.schema, &constant, "color");
     let layout = Layout::new(&read.schema, &constant, &scan.first_row, has_fine);
     let sources = read.names.into_iter().zip(points_per_input);
     let manifest = Manifest {
@@ -95,11 +96,20 @@ pub(super) fn plan(job: &Job, read: Read, warnings: &mut Vec<String>) -> Result<
         largest_rounding: scan.rounding,
         attributes: layout.attributes.clone(),
         groups: layout.groups.clone(),
-        fine: layout.fine.map(|group| Fine { group, cells_per_spacing: cells }),
+        fine: layout.fine.map(|group| Fine {
+            group,
+            color: layout.fine_color.is_some(),
+            cells_per_spacing: cells,
+        }),
         crs: read.crs,
         sources: sources.map(|(name, points)| SourceInfo { name, points }).collect(),
     };
     Ok(Planned { store, plan, layout, manifest })
+}
+
+/// Whether there is an attribute of that name whose values differ.
+fn varies(schema: &Schema, constant: &[bool], name: &str) -> bool {
+    schema.attributes.iter().zip(constant).any(|(a, &constant)| a.name == name && !constant)
 }
 
 /// Attributes of which every byte is the same in every row.

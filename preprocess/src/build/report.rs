@@ -76,13 +76,16 @@ pub struct ColumnBytes {
 }
 
 impl ColumnBytes {
-    /// Of the positions, of every attribute, then of fine positions.
+    /// Of the positions, of every attribute, then of fine positions and colours.
     pub(super) fn of(manifest: &Manifest, ranges: &Ranges) -> Vec<Self> {
         let names = manifest.attributes.iter().map(|attribute| attribute.name.as_str());
         let columns = std::iter::once("position").chain(names).zip(&ranges.column_bytes);
         let fine = manifest.fine.map(|_| ("position, fine", &ranges.fine_bytes));
+        let fine_color = manifest.fine.filter(|fine| fine.color);
+        let fine_color = fine_color.map(|_| ("color, fine", &ranges.fine_color_bytes));
         columns
             .chain(fine)
+            .chain(fine_color)
             .map(|(name, &bytes)| Self {
                 name: name.into(),
                 bytes,

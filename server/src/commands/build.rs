@@ -48,7 +48,7 @@ pub struct BuildArgs {
     #[arg(long, value_name = "STEP", value_parser = step)]
     pub scale: Option<f64>,
     /// Cells per spacing that positions are told to at first, a power of two up to 256; what is finer lies apart,
-    /// for views that show it. 0: positions in one part
+    /// for views that show it, and so do the last bits of colours. 0: all in one part
     #[arg(long, value_name = "CELLS", default_value_t = preprocess::CELLS_PER_SPACING)]
     pub cells: u32,
 }

@@ -186,6 +186,8 @@ fn groups(manifest: &Manifest) -> Vec<GroupDescription> {
         let position = (index == 0).then_some("position");
         let is_fine = manifest.fine.is_some_and(|fine| fine.group == index);
         let fine = is_fine.then_some("position, fine");
+        let has_fine_color = is_fine && manifest.fine.is_some_and(|fine| fine.color);
+        let fine = fine.into_iter().chain(has_fine_color.then_some("color, fine"));
         let names =
             position.into_iter().chain(fine).chain(manifest.columns_of(index).map(|a| &*a.name));
         let columns = names.zip(&group.columns).map(|(name, &bytes)| ColumnDescription {

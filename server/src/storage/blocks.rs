@@ -14,7 +14,8 @@ use quick_cache::{
 
 /// Size of a block. As large as the pieces that bodies are sent in, so that one is one.
 pub(super) const BLOCK_BYTES: u64 = 256 << 10;
-/// Most blocks of one request: 4 MiB. More only keeps the first of them waiting in memory.
+/// Most blocks of one request: 4 MiB. More only keeps the first of them waiting in memory. Small caches bring
+/// as many as half of them holds: what is pushed out before it is sent would be fetched again.
 const MAX_RUN: u64 = 16;
 /// What the cache needs for a block besides its bytes, about.
 const OVERHEAD_BYTES: u64 = 200;
@@ -36,6 +37,7 @@ impl Weighter<Key, Bytes> for ByBytes {
 #[derive(Debug)]
 pub(super) struct BlockCache {
     blocks: Cache<Key, Bytes, ByBytes>,
+    max_run: u64,
 }
 
 impl BlockCache {
@@ -54,7 +56,8 @@ impl BlockCache {
             Default::default(),
             quick_cache::sync::DefaultLifecycle::default(),
         );
-        Self { blocks }
+        let max_run = (capacity_bytes / (2 * BLOCK_BYTES)).clamp(1, MAX_RUN);
+        Self { blocks, max_run }
     }
 
     /// Bytes that are kept.
@@ -91,7 +94,7 @@ impl BlockCache {
         };
         let mut guards = vec![first];
         let last = until.saturating_sub(1).max(block * BLOCK_BYTES) / BLOCK_BYTES;
-        for next in (block + 1..=last).take(MAX_RUN as usize - 1) {
+        for next in (block + 1..=last).take(self.max_run as usize - 1) {
             match self.blocks.get_value_or_guard(&(object, next), Some(Duration::ZERO)) {
                 GuardResult::Guard(guard) => guards.push(guard),
                 GuardResult::Value(_) | GuardResult::Timeout => break,
@@ -153,6 +156,22 @@ mod tests {
         }
         let b = BLOCK_BYTES;
         assert_eq!(*asked.lock().expect("no panic"), [3 * b..4 * b, 0..3 * b, 4 * b..LENGTH]);
+    }
+
+    #[tokio::test]
+    async fn a_small_cache_brings_no_more_at_a_time_than_half_of_it_holds() {
+        let asked = Mutex::new(Vec::new());
+        let fetch = |range: Range<u64>| {
+            asked.lock().expect("no panic").push(range.clone());
+            serve(range)
+        };
+        for blocks in [0, 1, 4] {
+            let cache = BlockCache::new(blocks * BLOCK_BYTES);
+            let first = cache.get_or_fetch(1, 0, LENGTH, LENGTH, fetch).await.expect("there");
+            assert_eq!(first.len() as u64, BLOCK_BYTES);
+        }
+        let b = BLOCK_BYTES;
+        assert_eq!(*asked.lock().expect("no panic"), [0..b, 0..b, 0..2 * b]);
     }
 
     #[tokio::test]

@@ -132,12 +132,18 @@ impl Objects {
         let known = match self.known.get_value_or_guard_async(file_name).await {
             Ok(known) => known,
             Err(guard) => {
-                let former = former.and_then(|(_, known)| known.state.ok());
-                let state = self.look(file_name, former).await;
+                let former = former.map(|(_, known)| known);
+                let former_state = former.clone().and_then(|known| known.state.ok());
+                let state = self.look(file_name, former_state).await;
                 let known = Known { at: Instant::now(), state };
-                // What went wrong for now is not remembered.
-                if !matches!(known.state, Err(OpenError::Unreadable(_))) {
-                    let _ = guard.insert(known.clone());
+                // What went wrong for now is not remembered. What was known before is, and asked for again by
+                // the next: its blocks are still good where the object is the same.
+                let kept = match known.state {
+                    Err(OpenError::Unreadable(_)) => former,
+                    _ => Some(known.clone()),
+                };
+                if let Some(kept) = kept {
+                    let _ = guard.insert(kept);
                 }
                 known
             }
