@@ -137,11 +137,11 @@ fn place(camera: &Camera, at: [f64; 2], distance: f64) -> DVec3 {
         + at[1] * half * basis.up
 }
 
-/// Points at the picture's edges: none inside is culled, none well outside is kept.
+/// Points and boxes at the picture's edges: none that reaches inside is culled, none well outside is kept.
 fn culling(case: &Case, frame: &Frame, rng: &mut Rng) -> Row {
     let optics = Optics::new(&View { camera: case.camera, size_px: SIZE_PX });
     let (mut ours, mut single) = (0, 0);
-    for _ in 0..POINTS {
+    for count in 0..POINTS {
         let [low, high] = case.distances;
         let distance = 10f64.powf(low + rng.f64() * (high - low));
         let edge =
@@ -149,26 +149,41 @@ fn culling(case: &Case, frame: &Frame, rng: &mut Rng) -> Row {
         let sign = |rng: &mut Rng| if rng.bool() { 1.0 } else { -1.0 };
         let at = [edge(rng) * sign(rng), edge(rng) * sign(rng)];
         let point = place(&case.camera, at, distance);
-        let bounds = WorldBox { center: point, half: DVec3::ZERO };
+        // Every other box has an extent, up to that of what the picture shows there: the point lies anywhere in it.
+        let size = if count % 2 == 0 { 0.0 } else { distance * 10f64.powf(-4.0 * rng.f64()) };
+        let half = size * DVec3::from(std::array::from_fn(|_| rng.f64()));
+        let offset = half * DVec3::from(std::array::from_fn(|_| 2.0 * rng.f64() - 1.0));
+        let bounds = WorldBox { center: point + offset, half };
         let Some([x, y]) = frame.on_picture(point) else { continue };
         let reach = x.abs().max(y.abs());
         // Half the picture's height is 450 px: the margin is less than 2 % of it.
         let is_inside = reach <= 1.0;
-        let is_far_outside = reach > 1.03;
+        let is_far_outside = is_beyond(frame, &bounds, 1.03);
         let wrong = |is_outside: bool| (is_inside && is_outside) || (is_far_outside && !is_outside);
         ours += usize::from(wrong(optics.is_outside(&bounds)));
         single += usize::from(wrong(is_outside_in_f32(&case.camera, point)));
     }
     Row::new(
         format!("culling, {}", case.name),
-        (ours as f64, "points of 2000"),
+        (ours as f64, "boxes of 2000"),
         (0.0, MARGIN),
         REFERENCE,
     )
     .beside("world coordinates in single precision", single as f64)
 }
 
-/// The same with world coordinates that are floats.
+/// Whether all corners of a box are beyond the same side of the picture, `reach` halves of it from its middle.
+fn is_beyond(frame: &Frame, bounds: &WorldBox, reach: f64) -> bool {
+    let corner = |i: u8| {
+        let sign = |bit: u8| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
+        frame.on_picture(bounds.center + bounds.half * DVec3::new(sign(0), sign(1), sign(2)))
+    };
+    let Some(corners) = (0..8).map(corner).collect::<Option<Vec<_>>>() else { return false };
+    (0..2)
+        .any(|axis| [-1.0, 1.0].iter().any(|side| corners.iter().all(|at| side * at[axis] > reach)))
+}
+
+/// The same with world coordinates that are floats, of the point alone.
 fn is_outside_in_f32(camera: &Camera, point: DVec3) -> bool {
     let basis = camera.basis();
     let d = point.as_vec3() - camera.eye.as_vec3();

@@ -1,10 +1,19 @@
 //! Node keys, octants, Morton codes.
 
+use std::collections::HashSet;
+
 use fastrand::Rng;
 use lodestream_protocol::{Lattice, MAX_SIDE_BITS, MortonCode, NodeKey};
 
 use super::Rows;
-use crate::stability::Row;
+use crate::stability::{
+    Row, StabilityError,
+    dataset::{Built, Digits, Placed},
+    exact::{big, whole},
+};
+
+/// Grid cells a node's side: few, so that small clouds have many levels.
+const GRID: u32 = 8;
 
 const REFERENCE: &str = "bit by bit, in 128-bit integers";
 const EXACT: &str = "integers: shifts and masks";
@@ -70,43 +79,54 @@ pub(super) fn cases() -> Rows {
         "2^level cubes a side, levels 0 to 32",
     );
     let mut rows = vec![morton, keys, refused];
-    for (case, offset) in [("octants at 10^7 m, 1 mm detail", 1e7), ("octants at 10^9 m", 1e9)] {
-        rows.push(octants(case, offset, &mut rng));
+    let offsets =
+        [("octants at 10^7 m, 1 mm detail", 10_000_000), ("octants at 10^9 m", 1_000_000_000)];
+    for (case, offset) in offsets {
+        rows.push(octants(case, offset, &mut rng)?);
     }
     Ok(rows)
 }
 
-/// Octants of a cloud of 4 m at an offset, 12 levels down.
-fn octants(case: &'static str, offset: f64, rng: &mut Rng) -> Row {
+/// Octants of a cloud of 4 m, `offset` metres from the origin: in which nodes a build puts its points.
+fn octants(case: &'static str, offset: i64, rng: &mut Rng) -> Result<Row, StabilityError> {
     const LEVELS: u8 = 12;
-    let lattice = Lattice { scale: 0.001, offset: [offset; 3], origin: [0; 3], side_bits: LEVELS };
-    let points: Vec<[u32; 3]> =
+    const MM: i64 = 1000;
+    let within: Vec<[u32; 3]> =
         (0..2000).map(|_| std::array::from_fn(|_| rng.u32(..1 << LEVELS))).collect();
-    let (mut ours, mut single, mut double) = (0, 0, 0);
-    for &q in &points {
-        let mut key = NodeKey::ROOT;
-        let mut is_right = true;
-        for level in 0..LEVELS {
-            let bit = |a: usize| (q[a] >> (LEVELS - 1 - level) & 1) as u8;
-            let expected = bit(0) | bit(1) << 1 | bit(2) << 2;
-            match key.child(expected) {
-                Some(child) => {
-                    let corner = lattice.node_min(child);
-                    let side = 1u32 << (LEVELS - 1 - level);
-                    is_right &= (0..3).all(|a| corner[a] <= q[a] && q[a] - corner[a] < side);
-                    key = child;
-                }
-                None => is_right = false,
-            }
-        }
-        let world = lattice.world(q);
-        ours += usize::from(!is_right);
-        single += usize::from(halved::<f32>(world, offset as f32, 4.096, LEVELS) != q.map(Some));
-        double += usize::from(halved::<f64>(world, offset, 4.096, LEVELS) != q.map(Some));
-    }
-    Row::new(case, (ours as f64, "points of 2000"), (0.0, EXACT), REFERENCE)
-        .beside("boxes halved in single precision", single as f64)
-        .beside("boxes halved in double precision", double as f64)
+    let points = within.iter().map(|q| q.map(|c| offset * MM + i64::from(c))).collect();
+    let digits = Digits { name: case, decimals: 3, points };
+    let built = Built::of("case.xyz", digits.text().as_bytes(), GRID)?;
+    let lattice = built.dataset.manifest().lattice;
+    let (placed, half) = (built.points()?, whole(1) / whole(2));
+    let is_held = |point: &Placed| {
+        let (corner, level) = (lattice.node_min(point.node), point.node.level());
+        let exact = digits.exact(point.number);
+        (0..3).all(|a| {
+            // The lattice's scale is a double: a step is not quite a millimetre.
+            let steps = (&exact[a] - big(lattice.offset[a])) / big(lattice.scale)
+                - whole(lattice.origin[a].into())
+                - whole(corner[a].into());
+            steps >= -&half && steps < whole(1 << lattice.node_bits(level)) - &half
+        })
+    };
+    let held: HashSet<usize> = placed.iter().filter(|p| is_held(p)).map(|p| p.number).collect();
+    let halves_astray = |is_wrong: &dyn Fn([f64; 3]) -> [Option<u32>; 3]| {
+        let world = |q: [u32; 3]| q.map(|c| (offset * MM + i64::from(c)) as f64 / MM as f64);
+        within.iter().filter(|&&q| is_wrong(world(q)) != q.map(Some)).count() as f64
+    };
+    let side = f64::from(1u32 << LEVELS) / MM as f64;
+    let low = offset as f64;
+    let row = Row::new(
+        case,
+        ((within.len() - held.len()) as f64, "points of 2000"),
+        (0.0, EXACT),
+        "the file's decimals, in 512-bit floats, within the cube of their node",
+    );
+    let single = halves_astray(&|world| halved::<f32>(world, low as f32, side, LEVELS));
+    let double = halves_astray(&|world| halved::<f64>(world, low, side, LEVELS));
+    Ok(row
+        .beside("boxes halved in single precision", single)
+        .beside("boxes halved in double precision", double))
 }
 
 /// The cube of the finest level that halving a box of floats finds, as lattice coordinates.

@@ -82,13 +82,14 @@ fn row(cloud: &Digits) -> Result<Row, crate::stability::StabilityError> {
         let cube = point.q.map(|c| c.checked_shr(bits).unwrap_or(0));
         NodeKey::new(level, cube).is_some_and(|node| nodes.contains(&node))
     };
-    let (mut near, mut single) = (0usize, 0usize);
+    let (mut pairs, mut near, mut single) = (0usize, 0usize, 0usize);
     for (i, a) in sampled.iter().enumerate() {
         for b in &sampled[..i] {
             let level = a.node.level().max(b.node.level());
             if !is_in(a, level) || !is_in(b, level) {
                 continue;
             }
+            pairs += 1;
             // In lattice units; a cell is a unit at least.
             let bits = manifest.lattice.node_bits(level).saturating_sub(GRID.ilog2() as u8);
             let least = 1u128 << (2 * u32::from(bits));
@@ -101,9 +102,17 @@ fn row(cloud: &Digits) -> Result<Row, crate::stability::StabilityError> {
             single += usize::from(is_near != (distance < least));
         }
     }
-    let row = Row::new(cloud.name, ((near + lost) as f64, "pairs"), (0.0, EXACT), REFERENCE);
+    // Where nothing was compared, nothing was shown: but where all points are one, nothing can be.
+    let distinct: HashSet<&[i64; 3]> = cloud.points.iter().collect();
+    let vacuous = usize::from(distinct.len() > 1 && pairs == 0);
+    let row = Row::new(
+        format!("{} ({pairs} pairs)", cloud.name),
+        ((near + lost + vacuous) as f64, "pairs"),
+        (0.0, EXACT),
+        REFERENCE,
+    );
     // What a test in single precision would say wrongly of the same pairs.
-    Ok(if sampled.len() > 1 { row.beside("single precision", single as f64) } else { row })
+    Ok(if pairs > 0 { row.beside("single precision", single as f64) } else { row })
 }
 
 fn is_near_in_f32(a: [f64; 3], b: [f64; 3], least: f64) -> bool {
