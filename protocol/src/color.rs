@@ -92,7 +92,7 @@ impl Parting {
         Ok(Self { step, most, low_bits })
     }
 
-    /// `None` where nothing would come later.
+    /// `None` where nothing would come later, and nothing can be divided by.
     fn of(scalar: ScalarType, channels: &[u16]) -> Option<Self> {
         let step = channels.iter().fold(0, |step, &channel| {
             if step == 1 { 1 } else { greatest_common_divisor(step, channel) }
@@ -113,7 +113,8 @@ impl Parting {
             let is_noise = |bits: &u8| (points << bits) < NOISE_PER_JUMP * jumps;
             (1..=most_low).take_while(is_noise).last().unwrap_or(0)
         });
-        if low_bits == [0; 3] { None } else { Self::new(scalar, step, most, low_bits).ok() }
+        let gains = step > 1 || low_bits != [0; 3];
+        if gains { Self::new(scalar, step, most, low_bits).ok() } else { None }
     }
 
     fn in_steps(self, color: [u16; 3]) -> [i32; 3] {
@@ -158,7 +159,7 @@ const fn greatest_common_divisor(mut a: u16, mut b: u16) -> u16 {
 }
 
 /// Appends the colours of one node, `values` interleaved and little-endian, to the payload of group 0 and, where they
-/// are parted, of the fine group. Constant, dark and few colours are not.
+/// are parted, of the fine group. Constant, dark, smooth and few colours are not.
 ///
 /// # Errors
 /// [`Error::Corrupt`](crate::Error::Corrupt) where `values` is no whole number of values or too large.
@@ -203,6 +204,9 @@ pub fn encode_colors(
     let changing = config(ScalarType::I32, DeltaSpec::TryConsecutive(1));
     first.iter().try_for_each(|stream| push_stream(&mut data, stream, &changing))?;
     push_column(coarse, Encoding::CoarseColor, &data)?;
+    if parting.low_bits == [0; 3] {
+        return Ok(());
+    }
     data.clear();
     data.extend_from_slice(&parting.step.to_le_bytes());
     // Noise: what the bits need, and no search for patterns.
@@ -361,11 +365,12 @@ mod tests {
     }
 
     #[test]
-    fn dark_few_and_constant_colours_are_told_at_once() {
+    fn dark_smooth_few_and_constant_colours_are_told_at_once() {
         let dark: Vec<u16> = (0..900).map(|i| i % 64).collect();
+        let smooth: Vec<u16> = (0..900).map(|i| 257 * (i / 30 * 8 + i % 3)).collect();
         let few: Vec<u16> = (0..30).map(|i| i * 8).collect();
         let constant = [200, 100, 255].repeat(300);
-        for channels in [dark, few, constant] {
+        for channels in [dark, smooth, few, constant] {
             let (_, fine, shown) = parted(ScalarType::U16, &channels);
             assert!(fine.is_empty() && shown == bytes_of(ScalarType::U16, &channels));
         }

@@ -355,7 +355,7 @@ def read_node(file, index, node):
             start = payload.at
             (encoding, data) = take_column(payload) if length else (1, b"")
             sizes[i] += payload.at - start
-            coarse_color |= length > 0 and encoding == 8
+            coarse_color |= length > 0 and encoding == 8 and any(data[4:7])
             require(encoding != 8 or manifest["fine"].get("color") and attribute["name"] == "color", "coarse values are no colour")
             column = read_values(encoding, data, TYPES[attribute["type"]], attribute["components"], count)
             values[attribute["name"]] = column
