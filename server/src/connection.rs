@@ -43,6 +43,7 @@ pub(crate) struct ConnectionLimits {
     pub(crate) head_timeout: Duration,
     pub(crate) write_timeout: Duration,
     pub(crate) response_timeout: Duration,
+    pub(crate) max_body_bytes: usize,
 }
 
 impl From<&ServeConfig> for ConnectionLimits {
@@ -51,6 +52,7 @@ impl From<&ServeConfig> for ConnectionLimits {
             head_timeout: config.head_timeout,
             write_timeout: config.write_timeout,
             response_timeout: config.response_timeout,
+            max_body_bytes: config.max_body_bytes,
         }
     }
 }

@@ -218,7 +218,13 @@ async fn attend(
     loop {
         tokio::select! {
             biased;
-            () = sleep_until(end) => break,
+            () = sleep_until(end) => {
+                if shown.is_none() {
+                    let why = format!("broken off after {MOST_SECONDS} s, the longest that a run may be");
+                    crowd.ledger.add(|entries| entries.add_problem(why));
+                }
+                break;
+            }
             _ = ticks.tick() => {
                 let look = Look {
                     at: crowd.start.elapsed(),
@@ -263,8 +269,9 @@ async fn attend(
 /// A place that visitors take one after the other.
 async fn seat(crowd: Arc<Crowd>, number: usize, mut stopped: watch::Receiver<bool>) {
     let mut begin = crowd.start + crowd.ramp.mul_f64(number as f64 / crowd.clients as f64);
-    let (visits, rounds) = if crowd.keeps { (1, crowd.rounds) } else { (crowd.rounds, 1) };
-    for turn in 0..visits {
+    let (mut left, mut turn) = (crowd.rounds, 0);
+    while left > 0 {
+        let rounds = if crowd.keeps { left } else { 1 };
         tokio::select! {
             biased;
             _ = stopped.wait_for(|stopped| *stopped) => return,
@@ -282,13 +289,19 @@ async fn seat(crowd: Arc<Crowd>, number: usize, mut stopped: watch::Receiver<boo
         };
         let engine = TaskedEngine::start(sources, crowd.engine.clone(), Arc::clone(&crowd.commons));
         // So that visitors who follow one another do not begin at the same place.
-        let first = crowd.itinerary.offset(number + turn as usize * crowd.clients);
+        let first = crowd.itinerary.offset(number + turn * crowd.clients);
+        turn += 1;
         let course = Course { itinerary: &crowd.itinerary, first, rounds, begin };
         match visit(engine, &course, &crowd.ledger, &mut stopped).await {
             Ending::Stopped => return,
-            Ending::Complete => begin += crowd.itinerary.duration(),
+            Ending::Complete => {
+                left -= rounds;
+                begin += crowd.itinerary.duration();
+            }
             Ending::Failed(_) if crowd.meter.is_spent() => return,
             Ending::Failed(_) => {
+                // It counts as a round: a run ends though the host does not come back.
+                left -= 1;
                 sleep(PAUSE.mul_f64(0.5 + fastrand::f64())).await;
                 begin = Instant::now();
             }

@@ -1,8 +1,8 @@
 //! Hosts that misbehave: the engine ends settled on the same picture, or says why it cannot.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use lodestream_client::engine::{Engine, EngineConfig, EngineError};
+use lodestream_client::engine::{Coalesce, Engine, EngineConfig, EngineError};
 use lodestream_protocol::{HEADER_BYTES, Header};
 use tokio::sync::mpsc::unbounded_channel;
 
@@ -309,4 +309,42 @@ fn dropping_the_engine_does_not_wait_for_a_hanging_host() {
     hanging.blocking_recv().expect("a request is in flight");
     // Were the drop to wait for the request, or for those that would follow it, it would not return.
     drop(engine);
+}
+
+#[test]
+fn a_host_that_falls_silent_keeps_no_other_waiting() {
+    let recipe = Recipe { page_levels: 8, ..Recipe::default() };
+    let bytes = dataset(recipe);
+    // Each request is small, and so many are wanted that one host's take all that may be in flight.
+    let mut config = EngineConfig { paces: false, requests_in_flight: 3, ..config() };
+    config.coalesce = Coalesce::NONE;
+    config.point_budget *= 2;
+    config.speculative_bytes = HEADER_BYTES as u64;
+    let (reached, _reached) = unbounded_channel();
+    let silent = Host::start(bytes.clone(), move |request| match request.number {
+        // The header, and the rest of the index.
+        0 | 1 => Answer::Good,
+        _ => Answer::Hang { share: 0.0, reached: reached.clone() },
+    });
+    let good = Host::good(bytes);
+    let engine =
+        Engine::start(vec![http_source(&silent), http_source(&good)], config).expect("starts");
+    engine.set_view(overview(recipe.corner));
+    let end = Instant::now() + LONG;
+    let is_missing = |cloud: usize| {
+        let plan = engine.plan();
+        let drawn = plan.nodes.iter().filter(|node| node.cloud == cloud).count();
+        let wanted = plan.left_out.loading.nodes as usize + plan.nodes.len();
+        (drawn, wanted)
+    };
+    loop {
+        let ((of_silent, wanted), (of_good, _)) = (is_missing(0), is_missing(1));
+        // Both have the same nodes, and both want the same of them.
+        if of_good > 20 && 2 * of_good >= wanted {
+            assert!(of_silent < of_good, "the silent host sent {of_silent} nodes");
+            return;
+        }
+        assert!(Instant::now() < end, "{of_silent} and {of_good} nodes of {wanted}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
 }

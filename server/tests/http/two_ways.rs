@@ -85,6 +85,26 @@ fn both_ways_give_the_same_batch() {
 }
 
 #[test]
+fn neither_way_takes_a_longer_body_than_it_may() {
+    let (mut statuses, body) = (Vec::new(), vec![0; 101]);
+    for (limit, other) in [(100, ""), (100, "x-other: 1\r\n"), (101, ""), (101, "x-other: 1\r\n")] {
+        let site = Site::configured(|config| config.max_body_bytes = limit);
+        site.put("a.lods", &dataset(1, 10_000));
+        let mut stream = TcpStream::connect(site.server.addr()).expect("the server accepts");
+        let head = format!(
+            "POST /a.lods/batch HTTP/1.1\r\nhost: x\r\ncontent-type: {BATCH_REQUEST_TYPE}\r\n\
+             content-length: 101\r\n{other}\r\n"
+        );
+        stream.write_all(&[head.as_bytes(), &body].concat()).expect("the server reads");
+        let (lines, _) = answer(&mut stream);
+        statuses.extend(lines.into_iter().find(|line| line.starts_with("HTTP/1.1")));
+    }
+    // Of zeros: no batch request.
+    let (long, bad) = ("HTTP/1.1 413 Payload Too Large", "HTTP/1.1 400 Bad Request");
+    assert_eq!(statuses, [long, long, bad, bad]);
+}
+
+#[test]
 fn a_connection_may_change_its_way_in_the_middle_of_a_pipeline() {
     let (site, bytes) = Site::with_dataset();
     let mut stream = TcpStream::connect(site.server.addr()).expect("the server accepts");

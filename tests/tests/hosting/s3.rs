@@ -28,7 +28,7 @@ fn interpreter() -> &'static Path {
 }
 
 /// Any; it does not look at signatures, but wants to see one.
-const SIGNED: &str = "AWS4-HMAC-SHA256 Credential=key/20260101/us-east-1/s3/aws4_request, \
+pub const SIGNED: &str = "AWS4-HMAC-SHA256 Credential=key/20260101/us-east-1/s3/aws4_request, \
                       SignedHeaders=host, Signature=none";
 
 impl S3 {

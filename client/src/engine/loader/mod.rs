@@ -417,10 +417,9 @@ impl Loader {
         self.dispatched_at = now;
         self.take_from_prefixes(now);
         let free = self.config.requests_in_flight.max(1).saturating_sub(self.flights.len());
-        if free > 0 && self.pieces.backlog_bytes() <= MAX_BACKLOG_BYTES {
-            for (pieces, is_batch) in self.runs(now).into_iter().take(free) {
-                self.start_flight(pieces, is_batch);
-            }
+        let has_room = free > 0 || self.gates.len() > 1;
+        if has_room && self.pieces.backlog_bytes() <= MAX_BACKLOG_BYTES {
+            self.start_flights(free, self.runs(now));
             if self.config.paces {
                 self.wait_for_turns();
             }
@@ -428,6 +427,33 @@ impl Loader {
         let queued = self.demand.iter().filter(|piece| self.pieces.get(piece.id).is_none()).count();
         self.shared.counters.queued.set(queued as u64);
         self.shared.counters.in_flight.set(self.flights.len() as u64);
+    }
+
+    /// Starts requests, most important first. Where several hosts are asked, each has its share of all that may be in flight
+    /// at a time, and one request at least, so that a host which does not answer keeps nothing from the others.
+    fn start_flights(&mut self, mut free: usize, runs: Vec<(Vec<Piece>, bool)>) {
+        let host_of = |clouds: &BTreeMap<usize, Cloud>, cloud: usize| {
+            clouds.get(&cloud).and_then(|cloud| cloud.source.host().map(str::to_owned))
+        };
+        let mut in_flight: HashMap<Option<String>, usize> = HashMap::new();
+        for flight in self.flights.values() {
+            *in_flight.entry(host_of(&self.clouds, flight.cloud)).or_default() += 1;
+        }
+        let runs = runs.into_iter().filter_map(|(pieces, is_batch)| {
+            let host = host_of(&self.clouds, pieces.first()?.id.node.cloud);
+            in_flight.entry(host.clone()).or_default();
+            Some((host, pieces, is_batch))
+        });
+        let runs: Vec<_> = runs.collect();
+        let share = self.config.requests_in_flight.div_ceil(in_flight.len().max(1)).max(1);
+        for (host, pieces, is_batch) in runs {
+            let of_host = in_flight.entry(host).or_default();
+            if *of_host == 0 || free > 0 && *of_host < share {
+                *of_host += 1;
+                free = free.saturating_sub(1);
+                self.start_flight(pieces, is_batch);
+            }
+        }
     }
 
     /// Decodes wanted pieces whose bytes came with the first answer, and those without bytes.

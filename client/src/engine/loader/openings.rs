@@ -112,7 +112,14 @@ impl Loader {
         let was_open = known.boot.is_some();
         self.break_off_all(cloud);
         self.shared.traversal.post(Event::CloudFailed { cloud, message });
-        if was_open && !self.openings.values().any(|opening| opening.cloud == cloud) {
+        if was_open {
+            self.open_later(cloud);
+        }
+    }
+
+    /// Has a cloud opened anew, in patience, unless it is being opened.
+    fn open_later(&mut self, cloud: usize) {
+        if !self.openings.values().any(|opening| opening.cloud == cloud) {
             self.start_opening(cloud, true, PATIENCE.delay(1));
         }
     }
@@ -166,7 +173,11 @@ impl Loader {
     }
 
     pub(super) fn end_opening(&mut self, id: OpeningId) {
-        self.openings.remove(&id);
+        let Some(cloud) = self.openings.remove(&id).map(|opening| opening.cloud) else { return };
+        // What failed while its first bytes still came waited for them.
+        if self.clouds.get(&cloud).is_some_and(|known| known.failed && known.boot.is_some()) {
+            self.open_later(cloud);
+        }
     }
 
     pub(super) fn fail_opening(&mut self, id: OpeningId, message: String) {
