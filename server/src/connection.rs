@@ -86,7 +86,7 @@ pub(crate) async fn serve(
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 async fn converse(
-    stream: TcpStream,
+    mut stream: TcpStream,
     address: SocketAddr,
     host: &Host,
     watcher: Watcher,
@@ -111,7 +111,7 @@ async fn converse(
         let is_http2 = stream.get_ref().1.alpn_protocol() == Some(b"h2");
         return speak(stream, is_http2, peer, host, watcher, stopping).await;
     }
-    let begun = hot::serve(&stream, &host.site, limits, stopping.clone()).await;
+    let begun = hot::serve(&mut stream, &host.site, limits, stopping.clone()).await;
     let Some(begun) = begun else { return Ok(()) };
     let is_http2 = PREFACE.starts_with(&begun) || begun.starts_with(PREFACE);
     let (reader, writer) = stream.into_split();
