@@ -3,8 +3,8 @@
 //! To open a file, to read its header and to close it again takes half of the time that a small
 //! range takes. So files stay open, and a request only asks the system whether the name still leads
 //! to the same one: a dataset that is replaced, cut short or removed is so for the very next request.
-//! [`sweep`](OpenFiles::sweep) lets go of files that nobody asks for any more; until then, a removed
-//! one still takes its disk space.
+//! [`sweep`](OpenFiles::sweep) lets go of files whose name leads elsewhere by now, asked for or not; until then, a
+//! removed one still takes its disk space.
 
 use std::{
     collections::HashMap,
@@ -18,7 +18,7 @@ use crate::file::{DatasetFile, Identity, OpenError, missing_or_unreadable};
 /// Files kept open: far fewer than a process may have.
 const MAX_OPEN: usize = 256;
 
-/// How often files are looked at that nobody asks for.
+/// How often it is looked at where the names of open files lead.
 pub(crate) const SWEEP_INTERVAL: Duration = Duration::from_secs(10);
 
 type Entry = (Identity, Arc<DatasetFile>);

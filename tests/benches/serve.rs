@@ -48,7 +48,7 @@ const NODE_BYTES: u32 = 16 << 10;
 /// As many bytes as the client asks for at once.
 const NODES: usize = 16;
 /// Of every measurement.
-const SECONDS: u32 = 3;
+const SECONDS: u32 = 1;
 /// Different requests that a thread of wrk repeats.
 const REQUESTS: usize = 2000;
 

@@ -178,7 +178,9 @@ fn options(args: ViewArgs) -> anyhow::Result<ViewOptions> {
             );
             options.sources.extend(datasets);
         } else if path.is_file() && path.extension().is_some_and(|end| end == "json") {
-            options.session = Some(path.to_owned());
+            if let Some(other) = options.session.replace(path.to_owned()) {
+                anyhow::bail!("{} and {text}: one session at a time", other.display());
+            }
         } else if source::is_server(&text) {
             options.servers.push(text);
         } else {

@@ -30,6 +30,21 @@ fn without_a_screen_or_an_adapter_one_line_says_what_to_do() {
 }
 
 #[test]
+fn two_sessions_at_once_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sessions = ["a.json", "b.json"].map(|name| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, "{}").expect("written");
+        path.display().to_string()
+    });
+    let screen = Screen::new(640, 480);
+    let [a, b] = &sessions;
+    let arguments = [a, b, "--settings", "-"];
+    let said = refusal(Window::start(&screen, PROGRAM, &arguments, &[]).end());
+    assert!(said.contains("one session at a time") && said.contains("b.json"), "{said}");
+}
+
+#[test]
 fn what_cannot_be_opened_is_told_in_a_window_that_stays() {
     if is_without_gpu() {
         return;

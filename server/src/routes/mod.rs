@@ -118,7 +118,7 @@ impl Site {
         self.is_draining.load(Ordering::Relaxed)
     }
 
-    /// Lets go of files that nobody asks for any more, now and then; never ends.
+    /// Lets go of files whose names lead elsewhere by now, every so often; never ends.
     pub(crate) async fn sweep(self: Arc<Self>) {
         loop {
             tokio::time::sleep(SWEEP_INTERVAL).await;

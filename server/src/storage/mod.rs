@@ -174,7 +174,7 @@ impl Storage {
         }
     }
 
-    /// Lets go of files that nobody asks for any more.
+    /// Lets go of files whose names lead elsewhere by now.
     pub(crate) async fn sweep(&self) {
         if let Self::Folder(_, open_files) = self {
             let open_files = Arc::clone(open_files);
