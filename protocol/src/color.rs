@@ -130,12 +130,11 @@ impl Parting {
     /// The colour that is shown for it: in the middle of what it may be.
     fn shown(self, told: [i32; 3]) -> [i32; 3] {
         let middle = |c: usize| {
-            let side = 1 << self.low_bits[c];
-            told[c].saturating_mul(side).saturating_add(side / 2)
+            let side = 1i64 << self.low_bits[c];
+            i64::from(told[c]) * side + side / 2
         };
         let green = middle(0);
-        [green.saturating_add(middle(1)), green, green.saturating_add(middle(2))]
-            .map(|v| v.clamp(0, self.most.into()))
+        [green + middle(1), green, green + middle(2)].map(|v| v.clamp(0, self.most.into()) as i32)
     }
 
     fn push(self, data: &mut Vec<u8>) {
@@ -215,29 +214,34 @@ pub fn encode_colors(
     push_column(fine, Encoding::FineColor, &data)
 }
 
-/// The colours that are shown for coarse ones, as the column of exact ones would be.
+/// The colours that are shown for coarse ones, as the column of exact ones would be; and whether they lack
+/// anything. `None` where the next column is not one of those.
 pub(crate) fn decode_coarse_colors(
-    data: &mut &[u8],
+    bytes: &mut &[u8],
     scalar: ScalarType,
     count: usize,
-) -> Result<Vec<u8>> {
-    if !matches!(scalar, ScalarType::U8 | ScalarType::U16) {
-        return Err(corrupt("column", format!("colour of {scalar:?}")));
+) -> Result<Option<(Vec<u8>, bool)>> {
+    if bytes.first() != Some(&(Encoding::CoarseColor as u8)) {
+        return Ok(None);
     }
-    let parting = Parting::take(scalar, data)?;
-    let streams = take_three(data, count)?;
-    let mut bytes = Vec::with_capacity(count * 3 * scalar.size_bytes());
+    let (_, mut data) = take_column(bytes)?;
+    let parting = Parting::take(scalar, &mut data)?;
+    let streams = take_three(&mut data, count)?;
+    check_used(data)?;
+    let mut shown_bytes = Vec::with_capacity(count * 3 * scalar.size_bytes());
     for point in 0..count {
         let shown = parting.shown([0, 1, 2].map(|c| streams[c][point]));
         // At most the type's largest: see `Parting::new`.
         let channels = shown.map(|v| v as u16 * parting.step);
         if scalar == ScalarType::U8 {
-            bytes.extend(channels.map(|channel| channel as u8));
+            shown_bytes.extend(channels.map(|channel| channel as u8));
         } else {
-            channels.iter().for_each(|channel| bytes.extend_from_slice(&channel.to_le_bytes()));
+            channels
+                .iter()
+                .for_each(|channel| shown_bytes.extend_from_slice(&channel.to_le_bytes()));
         }
     }
-    Ok(bytes)
+    Ok(Some((shown_bytes, parting.low_bits != [0; 3])))
 }
 
 /// What the coarse colours of `attribute`, the manifest's number `index`, lack.
@@ -272,7 +276,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::attribute::Storage;
+    use crate::{attribute::Storage, column::decode_column};
 
     fn attribute(scalar: ScalarType) -> Attribute {
         Attribute {
@@ -297,8 +301,14 @@ mod tests {
         let values = bytes_of(scalar, channels);
         encode_colors(&mut coarse, &mut fine, &attribute(scalar), &values).expect("colours");
         let (mut rest, count) = (&coarse[..], channels.len() / 3);
-        let shown =
-            crate::column::decode_column(&mut rest, &attribute(scalar), count).expect("decodes");
+        let parted = decode_coarse_colors(&mut rest, scalar, count).expect("decodes");
+        let shown = match parted {
+            Some((shown, is_coarse)) => {
+                assert_eq!(is_coarse, !fine.is_empty());
+                shown
+            }
+            None => decode_column(&mut rest, &attribute(scalar), count).expect("decodes"),
+        };
         assert!(rest.is_empty());
         (coarse, fine, shown)
     }
@@ -358,8 +368,10 @@ mod tests {
             let extremes = [i32::MIN, -1, 0, 1, i32::MAX];
             let config = config(ScalarType::I32, DeltaSpec::NoOp);
             (0..3).for_each(|_| push_stream(&mut data, &extremes, &config).expect("a stream"));
-            let shown =
-                decode_coarse_colors(&mut &data[..], scalar, extremes.len()).expect("colours");
+            let mut column = Vec::new();
+            push_column(&mut column, Encoding::CoarseColor, &data).expect("a column");
+            let shown = decode_coarse_colors(&mut &column[..], scalar, extremes.len());
+            let (shown, _) = shown.expect("colours").expect("coarse ones");
             assert_eq!(shown.len(), extremes.len() * 3 * scalar.size_bytes());
         }
     }

@@ -93,6 +93,8 @@ pub struct DecodedGroup {
     pub positions: Vec<[u32; 3]>,
     /// log2 of the side of these cells in lattice units; 0 where the positions are whole.
     pub cell_bits: u8,
+    /// Whether there are colours that lack their last bits.
+    pub has_coarse_colors: bool,
     /// For the group of [`Fine`](crate::Fine) positions, where the node has any.
     pub fine: Option<FinePositions>,
     /// For that group, where group 0 has coarse colours of the node.
@@ -305,9 +307,6 @@ pub(crate) fn decode_column(
             ScalarType::U16 => decode_color::<u16>(&mut data, count, u16::wrapping_add)?,
             other => return Err(corrupt("column", format!("colour of {other:?}"))),
         },
-        Encoding::CoarseColor if components == 3 => {
-            decode_coarse_colors(&mut data, attribute.scalar, count)?
-        }
         other => {
             return Err(corrupt("column", format!("{}: encoding {other:?}", attribute.name)));
         }
@@ -421,6 +420,7 @@ pub fn decode_unchecked(
         }
     }
     let mut texels = 0;
+    let color = manifest.fine.and_then(|fine| manifest.fine_color(fine));
     for (index, attribute) in manifest.attributes.iter().enumerate() {
         if attribute.group() != Some(group) {
             continue;
@@ -429,7 +429,19 @@ pub fn decode_unchecked(
             Domain::Element => count,
             Domain::Texel => texels,
         };
-        let bytes = decode_column(&mut payload, attribute, values)?;
+        let is_parted = group == 0 && color == Some(index);
+        let coarse = if is_parted {
+            decode_coarse_colors(&mut payload, attribute.scalar, values)?
+        } else {
+            None
+        };
+        let bytes = match coarse {
+            Some((shown, is_coarse)) => {
+                decoded.has_coarse_colors = is_coarse;
+                shown
+            }
+            None => decode_column(&mut payload, attribute, values)?,
+        };
         if attribute.name == "texture_size" {
             texels = count_texels(attribute, &bytes)?;
         }

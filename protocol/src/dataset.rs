@@ -34,7 +34,9 @@ pub struct NodePoints {
     pub positions: Vec<[u32; 3]>,
     /// log2 of the side of these cells in lattice units; 0 where the positions are whole.
     pub cell_bits: u8,
-    /// Columns of the groups that were read, in the manifest's order; colours as coarse as the positions.
+    /// Whether colours lack their last bits, which come with fine positions.
+    pub has_coarse_colors: bool,
+    /// Columns of the groups that were read, in the manifest's order.
     pub columns: Vec<Column>,
 }
 
@@ -48,7 +50,13 @@ impl NodePoints {
     /// A node of which nothing was read yet.
     #[must_use]
     pub const fn new(key: NodeKey) -> Self {
-        Self { key, positions: Vec::new(), cell_bits: 0, columns: Vec::new() }
+        Self {
+            key,
+            positions: Vec::new(),
+            cell_bits: 0,
+            has_coarse_colors: false,
+            columns: Vec::new(),
+        }
     }
 
     /// Takes in a group; group 0 comes before fine positions.
@@ -58,6 +66,7 @@ impl NodePoints {
     pub fn add(&mut self, group: DecodedGroup) -> Result<()> {
         if !group.positions.is_empty() {
             (self.positions, self.cell_bits) = (group.positions, group.cell_bits);
+            self.has_coarse_colors = group.has_coarse_colors;
         }
         if let Some(fine) = group.fine {
             fine.refine(&mut self.positions)?;
@@ -65,9 +74,11 @@ impl NodePoints {
         }
         if let Some(fine) = group.fine_colors {
             let coarse = self.columns.iter_mut().find(|c| c.attribute == fine.attribute);
+            let coarse = coarse.filter(|_| self.has_coarse_colors);
             let coarse =
-                coarse.ok_or_else(|| corrupt("column", "fine colours before coarse ones"))?;
+                coarse.ok_or_else(|| corrupt("column", "fine colours without coarse ones"))?;
             fine.refine(&mut coarse.bytes)?;
+            self.has_coarse_colors = false;
         }
         self.columns.extend(group.columns);
         self.columns.sort_by_key(|column| column.attribute);
@@ -181,6 +192,9 @@ impl<R: ReadAt> Dataset<R> {
                 node.payloads.get(group).ok_or_else(|| corrupt("node", "no such group"))?;
             let bytes = self.source.read_at(payload.offset, payload.bytes as usize)?;
             points.add(decode_group(self.manifest(), group, node, &bytes)?)?;
+        }
+        if points.cell_bits > 0 || points.has_coarse_colors {
+            return Err(corrupt("node", "the last bits of positions or colours are not there"));
         }
         Ok(points)
     }

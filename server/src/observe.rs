@@ -117,6 +117,9 @@ struct Record {
 impl Drop for Record {
     fn drop(&mut self) {
         let until_last_byte = self.start.elapsed();
+        if std::thread::panicking() && self.until_first_byte.is_none() {
+            self.status = StatusCode::INTERNAL_SERVER_ERROR;
+        }
         let until_first_byte = self.until_first_byte.unwrap_or(until_last_byte);
         self.site.metrics.count(&Answered {
             dataset: &self.dataset,

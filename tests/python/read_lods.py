@@ -237,7 +237,7 @@ def read_values(encoding, data, dtype, components, count):
     elif encoding == 8:
         require(components == 3 and dtype in ("<u1", "<u2"), "only three u8 or u16 can be a colour")
         (step, most, *low_bits) = struct.unpack("<HH3B", column.take(7))
-        require(0 < step * max(most, 1) <= np.iinfo(dtype).max, "colours are larger than their type")
+        require(step > 0 and step * most <= np.iinfo(dtype).max, "colours are larger than their type")
         require(max(low_bits) <= 16, "colours lack more bits than they have")
         told = [stream(column, "<i4", count).astype(np.int64) for _ in range(3)]
         (middle, low, high) = ((v << bits) + (1 << bits) // 2 for v, bits in zip(told, low_bits))
@@ -356,7 +356,7 @@ def read_node(file, index, node):
             (encoding, data) = take_column(payload) if length else (1, b"")
             sizes[i] += payload.at - start
             coarse_color |= length > 0 and encoding == 8 and any(data[4:7])
-            require(encoding != 8 or manifest["fine"].get("color") and attribute["name"] == "color", "coarse values are no colour")
+            require(encoding != 8 or manifest.get("fine", {}).get("color") and attribute["name"] == "color", "coarse values are no colour")
             column = read_values(encoding, data, TYPES[attribute["type"]], attribute["components"], count)
             values[attribute["name"]] = column
             if attribute["name"] == "texture_size":

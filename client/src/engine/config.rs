@@ -25,7 +25,8 @@ pub struct EngineConfig {
     pub priority: Priority,
     /// Most bytes of decoded nodes that are kept though they are not drawn.
     pub cache_bytes: u64,
-    /// Most requests at a time, over all clouds; each host may have one, whatever the others have.
+    /// Most requests at a time, over all clouds. Where several hosts are asked, each may have its share of them,
+    /// whatever the others have.
     pub requests_in_flight: usize,
     /// Which neighbouring ranges are fetched with one request.
     pub coalesce: Coalesce,

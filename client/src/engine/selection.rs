@@ -282,6 +282,9 @@ impl Walk<'_> {
     fn shows_cells(&self, manifest: &Manifest, node: &Node, bounds: &WorldBox) -> bool {
         let Some(fine) = manifest.fine else { return false };
         let cell_bits = manifest.cell_bits(node.key.level(), node.spacing);
+        if self.limits.cell_px <= 0.0 {
+            return cell_bits > 0 || fine.color;
+        }
         let cell_world = match (cell_bits, fine.color) {
             (0, false) => return false,
             (0, true) => f64::from(node.spacing) / f64::from(fine.cells_per_spacing),

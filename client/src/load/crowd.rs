@@ -300,8 +300,10 @@ async fn seat(crowd: Arc<Crowd>, number: usize, mut stopped: watch::Receiver<boo
             }
             Ending::Failed(_) if crowd.meter.is_spent() => return,
             Ending::Failed(_) => {
-                // It counts as a round: a run ends though the host does not come back.
-                left -= 1;
+                // The round that was begun counts as well: a run ends though the host does not come back.
+                let round = crowd.itinerary.duration().as_secs_f64().max(1e-3);
+                let walked = (begin.elapsed().as_secs_f64() / round) as u32;
+                left = left.saturating_sub(walked.min(rounds - 1) + 1);
                 sleep(PAUSE.mul_f64(0.5 + fastrand::f64())).await;
                 begin = Instant::now();
             }

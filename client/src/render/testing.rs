@@ -139,6 +139,7 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
         let node = NodePoints {
             key,
             cell_bits: 0,
+            has_coarse_colors: false,
             positions: points.iter().map(relative).collect(),
             columns: vec![
                 Column { attribute: 0, bytes: colors.collect() },

@@ -223,6 +223,7 @@ fn part_of(points: &NodePoints, cloud: &Manifest, kept: &[u32]) -> NodePoints {
     NodePoints {
         key: points.key,
         cell_bits: points.cell_bits,
+        has_coarse_colors: points.has_coarse_colors,
         positions: kept.iter().map(|index| points.positions[*index as usize]).collect(),
         columns: columns.collect(),
     }

@@ -1,7 +1,8 @@
 //! The second phase: the lattice is chosen, the chunks are planned, the columns laid out.
 
 use lodestream_protocol::{
-    Fine, LatticeBox, Manifest, Method as ManifestMethod, Primitive, Refinement, SourceInfo,
+    Fine, LatticeBox, Manifest, Method as ManifestMethod, Primitive, Refinement, ScalarType,
+    SourceInfo,
 };
 
 use super::{Job, chunks, read::Read};
@@ -11,6 +12,7 @@ use crate::{
     error::Result,
     grid::{self, InputCoordinates},
     plan::Plan,
+    readers::InputAttribute,
     schema::Schema,
     store::Store,
 };
@@ -76,7 +78,7 @@ pub(super) fn plan(job: &Job, read: Read, warnings: &mut Vec<String>) -> Result<
     // Where the root has no cells, no node has.
     let cells = config.cells_per_spacing;
     let has_cells = cells > 0 && choice.lattice.side_bits > (cells * config.grid).ilog2() as u8;
-    let has_fine = has_cells || cells > 0 && varies(&read.schema, &constant, "color");
+    let has_fine = has_cells || cells > 0 && has_colors(&read.schema, &constant);
     let layout = Layout::new(&read.schema, &constant, &scan.first_row, has_fine);
     let sources = read.names.into_iter().zip(points_per_input);
     let manifest = Manifest {
@@ -107,9 +109,14 @@ pub(super) fn plan(job: &Job, read: Read, warnings: &mut Vec<String>) -> Result<
     Ok(Planned { store, plan, layout, manifest })
 }
 
-/// Whether there is an attribute of that name whose values differ.
-fn varies(schema: &Schema, constant: &[bool], name: &str) -> bool {
-    schema.attributes.iter().zip(constant).any(|(a, &constant)| a.name == name && !constant)
+/// Whether there are colours that can be stored in two parts, and that differ.
+fn has_colors(schema: &Schema, constant: &[bool]) -> bool {
+    let is_color = |a: &InputAttribute| {
+        a.name == "color"
+            && a.components == 3
+            && matches!(a.scalar, ScalarType::U8 | ScalarType::U16)
+    };
+    schema.attributes.iter().zip(constant).any(|(a, &constant)| is_color(a) && !constant)
 }
 
 /// Attributes of which every byte is the same in every row.

@@ -59,6 +59,8 @@ pub(crate) struct Objects {
     store: Box<dyn ObjectStore>,
     prefix: Path,
     known: Cache<String, Known>,
+    /// What was there when it was last asked for with success.
+    last: Cache<String, Arc<ObjectState>>,
     blocks: BlockCache,
     requests: Semaphore,
     next_number: AtomicU64,
@@ -82,6 +84,7 @@ impl Objects {
             store,
             prefix,
             known: Cache::new(MAX_NAMES),
+            last: Cache::new(MAX_NAMES),
             blocks: BlockCache::new(cache_bytes),
             requests: Semaphore::new(MAX_REQUESTS),
             next_number: AtomicU64::new(0),
@@ -128,22 +131,21 @@ impl Objects {
         self: &Arc<Self>,
         file_name: &str,
     ) -> std::result::Result<Object, OpenError> {
-        let former = self.known.remove_if(file_name, |known| known.at.elapsed() >= FRESH);
+        self.known.remove_if(file_name, |known| known.at.elapsed() >= FRESH);
         let known = match self.known.get_value_or_guard_async(file_name).await {
             Ok(known) => known,
             Err(guard) => {
-                let former = former.map(|(_, known)| known);
-                let former_state = former.clone().and_then(|known| known.state.ok());
-                let state = self.look(file_name, former_state).await;
-                let known = Known { at: Instant::now(), state };
-                // What went wrong for now is not remembered. What was known before is, and asked for again by
-                // the next: its blocks are still good where the object is the same.
-                let kept = match known.state {
-                    Err(OpenError::Unreadable(_)) => former,
-                    _ => Some(known.clone()),
-                };
-                if let Some(kept) = kept {
-                    let _ = guard.insert(kept);
+                let former = self.last.get(file_name);
+                let known = Known { at: Instant::now(), state: self.look(file_name, former).await };
+                match &known.state {
+                    Ok(state) => self.last.insert(file_name.to_owned(), Arc::clone(state)),
+                    Err(OpenError::Missing) => _ = self.last.remove(file_name),
+                    // What went wrong for now is not remembered. What was there before is: its blocks are
+                    // still good where the object turns out to be the same.
+                    Err(OpenError::Unreadable(_)) => {}
+                }
+                if !matches!(known.state, Err(OpenError::Unreadable(_))) {
+                    let _ = guard.insert(known.clone());
                 }
                 known
             }

@@ -38,7 +38,7 @@ pub fn decode(
                     decode_group(&boot.manifest, group, &piece.node, bytes).map(Content::Decoded)
                 }
                 Payloads::Count => check_group(&piece.node, group, bytes)
-                    .map(|()| Content::Counted(decoded_bytes(piece, &boot.manifest))),
+                    .map(|()| Content::Counted(kept_bytes(piece, &boot.manifest))),
             };
             content.map(Decoded::Group)
         }
@@ -49,8 +49,17 @@ pub fn decode(
     (result, u64::try_from(begin.elapsed().as_nanos()).unwrap_or(u64::MAX))
 }
 
-/// An estimate of the bytes that a piece takes once it is decoded.
+/// An estimate of the bytes that a piece takes once it is decoded, and until it is taken in.
 pub fn decoded_bytes(piece: &Piece, manifest: &Manifest) -> u64 {
+    let fine = manifest.fine.filter(|fine| piece.id.part == Part::Group(fine.group));
+    let fine_bytes = fine.map_or(0, |fine| {
+        size_of::<[u32; 3]>() + if fine.color { size_of::<[u16; 3]>() } else { 0 }
+    });
+    kept_bytes(piece, manifest) + u64::from(piece.node.points) * fine_bytes as u64
+}
+
+/// An estimate of the bytes by which a piece makes its node larger.
+fn kept_bytes(piece: &Piece, manifest: &Manifest) -> u64 {
     match piece.id.part {
         Part::Page => piece.len.saturating_mul(4),
         Part::Group(group) => {

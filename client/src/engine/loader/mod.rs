@@ -17,7 +17,7 @@ mod pace;
 mod pieces;
 
 use std::{
-    collections::{BTreeMap, HashMap, HashSet},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     sync::{Arc, atomic::Ordering},
 };
 
@@ -417,9 +417,12 @@ impl Loader {
         self.dispatched_at = now;
         self.take_from_prefixes(now);
         let free = self.config.requests_in_flight.max(1).saturating_sub(self.flights.len());
-        let has_room = free > 0 || self.gates.len() > 1;
+        let has_room = free > 0 || {
+            let by_host = self.by_host();
+            by_host.len() > 1 && by_host.values().any(|&count| count < self.share(by_host.len()))
+        };
         if has_room && self.pieces.backlog_bytes() <= MAX_BACKLOG_BYTES {
-            self.start_flights(free, self.runs(now));
+            self.start_flights(self.runs(now));
             if self.config.paces {
                 self.wait_for_turns();
             }
@@ -429,30 +432,46 @@ impl Loader {
         self.shared.counters.in_flight.set(self.flights.len() as u64);
     }
 
-    /// Starts requests, most important first. Where several hosts are asked, each has its share of all that may be in flight
-    /// at a time, and one request at least, so that a host which does not answer keeps nothing from the others.
-    fn start_flights(&mut self, mut free: usize, runs: Vec<(Vec<Piece>, bool)>) {
-        let host_of = |clouds: &BTreeMap<usize, Cloud>, cloud: usize| {
-            clouds.get(&cloud).and_then(|cloud| cloud.source.host().map(str::to_owned))
-        };
-        let mut in_flight: HashMap<Option<String>, usize> = HashMap::new();
-        for flight in self.flights.values() {
-            *in_flight.entry(host_of(&self.clouds, flight.cloud)).or_default() += 1;
+    /// Requests in flight by host: of all that are in flight, or that something is wanted of.
+    fn by_host(&self) -> HashMap<Option<&str>, usize> {
+        let host = |cloud: &usize| Some(self.clouds.get(cloud)?.source.host());
+        let wanted: BTreeSet<usize> = self.demand.iter().map(|p| p.id.node.cloud).collect();
+        let mut by_host: HashMap<_, _> = wanted.iter().filter_map(host).map(|h| (h, 0)).collect();
+        for host in self.flights.values().filter_map(|flight| host(&flight.cloud)) {
+            *by_host.entry(host).or_default() += 1;
         }
-        let runs = runs.into_iter().filter_map(|(pieces, is_batch)| {
-            let host = host_of(&self.clouds, pieces.first()?.id.node.cloud);
-            in_flight.entry(host.clone()).or_default();
-            Some((host, pieces, is_batch))
-        });
-        let runs: Vec<_> = runs.collect();
-        let share = self.config.requests_in_flight.div_ceil(in_flight.len().max(1)).max(1);
-        for (host, pieces, is_batch) in runs {
-            let of_host = in_flight.entry(host).or_default();
-            if *of_host == 0 || free > 0 && *of_host < share {
+        by_host
+    }
+
+    /// Of so many hosts, what each may have in flight whatever the others have.
+    fn share(&self, hosts: usize) -> usize {
+        self.config.requests_in_flight.max(1).div_ceil(hosts.max(1))
+    }
+
+    /// Starts requests, most important first. Where several hosts are asked, each has its share of all that may be in flight
+    /// at a time, so that one which does not answer keeps nothing from the others; what is left is for whoever wants more.
+    fn start_flights(&mut self, runs: Vec<(Vec<Piece>, bool)>) {
+        let mut by_host = self.by_host();
+        let share = self.share(by_host.len());
+        let mut starting = Vec::new();
+        let mut more = Vec::new();
+        for run in runs {
+            let cloud = run.0.first().and_then(|piece| self.clouds.get(&piece.id.node.cloud));
+            let Some(of_host) = cloud.and_then(|cloud| by_host.get_mut(&cloud.source.host()))
+            else {
+                continue;
+            };
+            if *of_host < share {
                 *of_host += 1;
-                free = free.saturating_sub(1);
-                self.start_flight(pieces, is_batch);
+                starting.push(run);
+            } else {
+                more.push(run);
             }
+        }
+        let in_flight = self.flights.len() + starting.len();
+        let free = self.config.requests_in_flight.max(1).saturating_sub(in_flight);
+        for (pieces, is_batch) in starting.into_iter().chain(more.into_iter().take(free)) {
+            self.start_flight(pieces, is_batch);
         }
     }
 

@@ -43,8 +43,8 @@ pub struct Piece {
 pub struct Resident {
     pub layout: RecordLayout,
     pub pieces: Vec<Piece>,
-    /// How exactly its points are placed.
-    cell_bits: u8,
+    /// How exactly its points are placed, and whether their colours lack their last bits.
+    precision: (u8, bool),
     frame: u64,
     /// Keeps the address that stands for the cloud in the key from being used again.
     _cloud: Arc<Manifest>,
@@ -134,7 +134,7 @@ impl Pool {
     }
 
     /// A node of `cloud` with records of `fields`, uploaded if it is not there yet; `None` where
-    /// that must wait for another frame. Until a node whose points are placed more exactly can be uploaded,
+    /// that must wait for another frame. Until a node that is more exact can be uploaded,
     /// the one that it replaces is there still: what was seen does not go away.
     pub fn node(
         &mut self,
@@ -146,10 +146,11 @@ impl Pool {
         surface: &NodeSurface,
     ) -> Option<Found<'_>> {
         let points = node.points.as_ref();
+        let precision = (points.cell_bits, points.has_coarse_colors);
         let key =
             Key { cloud: Arc::as_ptr(cloud).addr(), node: points.key, part: node.part, fields };
         // One that this frame draws already stays as it is.
-        let replaced = self.nodes.peek(&key).filter(|old| old.cell_bits != points.cell_bits);
+        let replaced = self.nodes.peek(&key).filter(|old| old.precision != precision);
         let replaced = replaced.map(|old| old.frame != self.frame);
         let is_wanted = replaced.unwrap_or_else(|| !self.nodes.contains(&key));
         let is_new = is_wanted && self.enter(device, key, cloud, points, colors, surface);
@@ -186,8 +187,8 @@ impl Pool {
             self.release(old);
         }
         let pieces = self.upload(device, points.positions.len(), &layout, &words);
-        let cell_bits = points.cell_bits;
-        let resident = Resident { layout, pieces, cell_bits, frame: 0, _cloud: Arc::clone(cloud) };
+        let precision = (points.cell_bits, points.has_coarse_colors);
+        let resident = Resident { layout, pieces, precision, frame: 0, _cloud: Arc::clone(cloud) };
         self.nodes.put(key, resident);
         true
     }

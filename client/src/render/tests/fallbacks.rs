@@ -1,5 +1,7 @@
 //! What the renderer does without: features, limits, room, time, and the device itself.
 
+use lodestream_protocol::NodePoints;
+
 use super::*;
 use crate::render::{GpuPath, Renderer, Shading};
 
@@ -67,6 +69,22 @@ fn a_frame_uploads_no_more_than_it_may_until_all_is_there() {
 
 #[test]
 fn what_is_placed_more_exactly_replaces_what_was_seen_and_nothing_is_missing_meanwhile() {
+    is_replaced(|points| {
+        points.cell_bits = 4;
+        points.positions.iter_mut().flatten().for_each(|q| *q = *q & !15 | 8);
+    });
+}
+
+#[test]
+fn colours_that_become_exact_replace_coarse_ones_of_points_that_stay_where_they_are() {
+    is_replaced(|points| {
+        points.has_coarse_colors = true;
+        points.columns[0].bytes.iter_mut().for_each(|byte| *byte = *byte & !63 | 32);
+    });
+}
+
+/// Draws a world roughly and exactly, and roughly again.
+fn is_replaced(roughen: impl Fn(&mut NodePoints)) {
     if !has_gpu() {
         return;
     }
@@ -75,8 +93,7 @@ fn what_is_placed_more_exactly_replaces_what_was_seen_and_nothing_is_missing_mea
     let mut rough = TestScene { clouds: exact.clouds.clone(), ..small_world() };
     for node in &mut rough.nodes {
         let mut points = node.points.as_ref().clone();
-        points.cell_bits = 4;
-        points.positions.iter_mut().flatten().for_each(|q| *q = *q & !15 | 8);
+        roughen(&mut points);
         node.points = Arc::new(points);
     }
     let settings = settings(looking_at_landscape());

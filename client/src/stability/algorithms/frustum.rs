@@ -149,7 +149,7 @@ fn culling(case: &Case, frame: &Frame, rng: &mut Rng) -> Row {
         let sign = |rng: &mut Rng| if rng.bool() { 1.0 } else { -1.0 };
         let at = [edge(rng) * sign(rng), edge(rng) * sign(rng)];
         let point = place(&case.camera, at, distance);
-        // Every other box has an extent, up to that of what the picture shows there: the point lies anywhere in it.
+        // Every other box has an extent, up to its distance: the point lies anywhere in it.
         let size = if count % 2 == 0 { 0.0 } else { distance * 10f64.powf(-4.0 * rng.f64()) };
         let half = size * DVec3::from(std::array::from_fn(|_| rng.f64()));
         let offset = half * DVec3::from(std::array::from_fn(|_| 2.0 * rng.f64() - 1.0));
