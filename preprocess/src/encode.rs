@@ -1,9 +1,9 @@
 //! From points to node payloads: gathers a node's columns and encodes them, group by group.
 
 use lodestream_protocol::{
-    Attribute, Domain, Error as FormatError, GroupInfo, LatticeBox, Manifest, MortonCode, NodeKey,
-    NormalCone, ScalarType, encode_cells, encode_colors, encode_column, encode_fine_positions,
-    encode_positions, is_partable_color,
+    Attribute, Domain, Error as FormatError, Fine, GroupInfo, LatticeBox, Manifest, MortonCode,
+    NodeKey, NormalCone, ScalarType, encode_cells, encode_colors, encode_column,
+    encode_fine_positions, encode_positions, is_partable_color,
 };
 
 use crate::{cones::NormalColumn, readers::InputAttribute, schema::Schema};
@@ -207,14 +207,24 @@ impl Ranges {
         }
         let columns = manifest.attributes.iter().map(Attribute::group);
         let columns = std::iter::once(Some(0)).chain(columns).zip(&self.column_bytes);
-        let fine = manifest.fine.map(|fine| (Some(fine.group), &self.fine_bytes));
-        let fine_color = manifest.fine.filter(|fine| fine.color);
-        let fine_color = fine_color.map(|fine| (Some(fine.group), &self.fine_color_bytes));
-        let columns = columns.chain(fine).chain(fine_color);
+        let fine_group = manifest.fine.map(|fine| fine.group);
+        let fine = self.fine_columns(manifest.fine).map(|(_, bytes)| (fine_group, bytes));
+        let columns = columns.chain(fine);
         for (index, group) in manifest.groups.iter_mut().enumerate() {
             let own = columns.clone().filter(|(group, _)| *group == Some(index));
             group.columns = own.map(|(_, &bytes)| bytes).collect();
         }
+    }
+
+    /// Names and bytes of the fine group's columns, in order.
+    pub fn fine_columns(&self, fine: Option<Fine>) -> impl Iterator<Item = (&str, &u64)> + Clone {
+        let names = fine.map_or(&[][..], Fine::columns);
+        names.iter().copied().zip([&self.fine_bytes, &self.fine_color_bytes])
+    }
+
+    /// Encoded bytes of all columns.
+    pub fn bytes(&self) -> u64 {
+        self.column_bytes.iter().sum::<u64>() + self.fine_bytes + self.fine_color_bytes
     }
 
     fn grow(&mut self, attribute: usize, scalar: ScalarType, values: &[u8]) {

@@ -65,11 +65,15 @@ impl FineColors {
 /// Whether an attribute's values are colours that may be stored in two parts.
 #[must_use]
 pub fn is_partable_color(attribute: &Attribute) -> bool {
-    attribute.name == "color"
-        && attribute.components == 3
-        && attribute.domain == Domain::Element
+    attribute.domain == Domain::Element
         && attribute.group() == Some(0)
-        && matches!(attribute.scalar, ScalarType::U8 | ScalarType::U16)
+        && is_color(&attribute.name, attribute.scalar, attribute.components)
+}
+
+/// Whether values of that name and type are colours as they are stored in two parts.
+#[must_use]
+pub fn is_color(name: &str, scalar: ScalarType, components: u8) -> bool {
+    name == "color" && components == 3 && matches!(scalar, ScalarType::U8 | ScalarType::U16)
 }
 
 /// How a node's colours are parted. Every channel is `step` times a number up to `most`.

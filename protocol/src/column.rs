@@ -405,14 +405,15 @@ pub fn decode_unchecked(
         return Ok(decoded);
     }
     let bits = manifest.lattice.node_bits(node.key.level());
+    let color = manifest.fine_color();
     if group == 0 {
         (decoded.positions, decoded.cell_bits) = decode_positions(&mut payload, count, bits)?;
-    } else if let Some(fine) = manifest.fine.filter(|fine| fine.group == group) {
+    } else if manifest.fine.is_some_and(|fine| fine.group == group) {
         // What group 0 tells whole has no second part.
         if payload.first() == Some(&(Encoding::FinePositions as u8)) {
             decoded.fine = Some(decode_fine_positions(&mut payload, count, bits)?);
         }
-        if let Some(index) = manifest.fine_color(fine)
+        if let Some(index) = color
             && !payload.is_empty()
         {
             let color = &manifest.attributes[index];
@@ -420,7 +421,6 @@ pub fn decode_unchecked(
         }
     }
     let mut texels = 0;
-    let color = manifest.fine.and_then(|fine| manifest.fine_color(fine));
     for (index, attribute) in manifest.attributes.iter().enumerate() {
         if attribute.group() != Some(group) {
             continue;
@@ -429,8 +429,7 @@ pub fn decode_unchecked(
             Domain::Element => count,
             Domain::Texel => texels,
         };
-        let is_parted = group == 0 && color == Some(index);
-        let coarse = if is_parted {
+        let coarse = if color == Some(index) {
             decode_coarse_colors(&mut payload, attribute.scalar, values)?
         } else {
             None

@@ -33,7 +33,7 @@ pub use batch::{
 pub use boot::{
     BOOT_SPECULATIVE_BYTES, Boot, HEADER_BYTES, Header, MAGIC, VERSION_MAJOR, VERSION_MINOR,
 };
-pub use color::{COARSE_COLOR_BITS, FineColors, encode_colors, is_partable_color};
+pub use color::{COARSE_COLOR_BITS, FineColors, encode_colors, is_color, is_partable_color};
 pub use column::{
     Column, DecodedGroup, Encoding, check_group, decode_group, decode_unchecked, encode_column,
 };

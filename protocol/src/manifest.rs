@@ -94,6 +94,14 @@ pub struct Fine {
     pub cells_per_spacing: u32,
 }
 
+impl Fine {
+    /// What the group's columns are, in order.
+    #[must_use]
+    pub fn columns(self) -> &'static [&'static str] {
+        if self.color { &["position, fine", "color, fine"] } else { &["position, fine"] }
+    }
+}
+
 /// One input the dataset was made from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceInfo {
@@ -208,13 +216,13 @@ impl Manifest {
             }
         }
         for (index, group) in self.groups.iter().enumerate() {
-            let is_fine = self.fine.is_some_and(|fine| fine.group == index);
-            let fine_color = is_fine && self.fine.is_some_and(|fine| fine.color);
+            let fine = self.fine.filter(|fine| fine.group == index);
             let attributes = self.columns_of(index).count();
-            if is_fine && attributes > 0 {
+            if fine.is_some() && attributes > 0 {
                 return bad(format!("group {} of fine positions has attributes", group.name));
             }
-            let columns = usize::from(index == 0 || is_fine) + usize::from(fine_color) + attributes;
+            let fine = fine.map_or(0, |fine| fine.columns().len());
+            let columns = usize::from(index == 0) + fine + attributes;
             if group.columns.len() != columns {
                 return bad(format!(
                     "group {} tells the bytes of {} columns, it has {columns}",
@@ -225,7 +233,7 @@ impl Manifest {
         }
         if let Some(fine) = self.fine
             && fine.color
-            && self.fine_color(fine).is_none()
+            && self.fine_color().is_none()
         {
             return bad("fine colours of what is no colour in group 0".into());
         }
@@ -254,8 +262,9 @@ impl Manifest {
 
     /// Index of the colours that are stored in two parts.
     #[must_use]
-    pub fn fine_color(&self, fine: Fine) -> Option<usize> {
-        self.attributes.iter().position(is_partable_color).filter(|_| fine.color)
+    pub fn fine_color(&self) -> Option<usize> {
+        self.fine.filter(|fine| fine.color)?;
+        self.attributes.iter().position(is_partable_color)
     }
 
     /// Attributes stored as columns of `group`, in column order.

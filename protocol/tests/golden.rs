@@ -243,15 +243,7 @@ fn colours_in_two_parts_keep_their_bytes() {
     for step in [1u16, 257] {
         let colors = (0..300u16).flat_map(|i| [i * 7 % 256, i % 256, 255 - i / 2]);
         let values: Vec<u8> = colors.flat_map(|c| (c * step).to_le_bytes()).collect();
-        let color = Attribute {
-            name: "color".into(),
-            scalar: ScalarType::U16,
-            components: 3,
-            domain: Domain::Element,
-            storage: Storage::Column { group: 0 },
-            min: vec![],
-            max: vec![],
-        };
+        let color = attribute("color", ScalarType::U16, 3, 0);
         let mut fine = Vec::new();
         encode_colors(&mut bytes, &mut fine, &color, &values).expect("encodes");
         assert!(!fine.is_empty());

@@ -11,6 +11,9 @@ use super::{
     exact::{Big, whole},
 };
 
+/// Grid cells a node's side that make small clouds have many levels.
+pub(super) const FEW_CELLS: u32 = 8;
+
 /// Points with a known number of decimals: whole multiples of `10^-decimals`.
 pub(super) struct Digits {
     /// What is stiff or extreme about them.

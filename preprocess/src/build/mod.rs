@@ -139,11 +139,7 @@ fn build_in_pool(job: &Job) -> Result<BuildReport> {
     manifest.levels = nodes.last().map_or(0, |n| n.key.level() + 1);
     ranges.fill(&mut manifest);
 
-    phases.begin(
-        "write",
-        ranges.fine_bytes + ranges.fine_color_bytes + ranges.column_bytes.iter().sum::<u64>(),
-        "bytes",
-    );
+    phases.begin("write", ranges.bytes(), "bytes");
     let written = assemble::write(&config.output, &manifest, &nodes, &blobs.finish(), &|bytes| {
         progress.advance(bytes);
         job.check()

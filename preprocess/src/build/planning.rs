@@ -1,8 +1,8 @@
 //! The second phase: the lattice is chosen, the chunks are planned, the columns laid out.
 
 use lodestream_protocol::{
-    Fine, LatticeBox, Manifest, Method as ManifestMethod, Primitive, Refinement, ScalarType,
-    SourceInfo,
+    Fine, LatticeBox, Manifest, Method as ManifestMethod, Primitive, Refinement, SourceInfo,
+    is_color,
 };
 
 use super::{Job, chunks, read::Read};
@@ -12,7 +12,6 @@ use crate::{
     error::Result,
     grid::{self, InputCoordinates},
     plan::Plan,
-    readers::InputAttribute,
     schema::Schema,
     store::Store,
 };
@@ -111,12 +110,8 @@ pub(super) fn plan(job: &Job, read: Read, warnings: &mut Vec<String>) -> Result<
 
 /// Whether there are colours that can be stored in two parts, and that differ.
 fn has_colors(schema: &Schema, constant: &[bool]) -> bool {
-    let is_color = |a: &InputAttribute| {
-        a.name == "color"
-            && a.components == 3
-            && matches!(a.scalar, ScalarType::U8 | ScalarType::U16)
-    };
-    schema.attributes.iter().zip(constant).any(|(a, &constant)| is_color(a) && !constant)
+    let mut attributes = schema.attributes.iter().zip(constant);
+    attributes.any(|(a, &constant)| !constant && is_color(&a.name, a.scalar, a.components))
 }
 
 /// Attributes of which every byte is the same in every row.

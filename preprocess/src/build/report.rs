@@ -80,12 +80,8 @@ impl ColumnBytes {
     pub(super) fn of(manifest: &Manifest, ranges: &Ranges) -> Vec<Self> {
         let names = manifest.attributes.iter().map(|attribute| attribute.name.as_str());
         let columns = std::iter::once("position").chain(names).zip(&ranges.column_bytes);
-        let fine = manifest.fine.map(|_| ("position, fine", &ranges.fine_bytes));
-        let fine_color = manifest.fine.filter(|fine| fine.color);
-        let fine_color = fine_color.map(|_| ("color, fine", &ranges.fine_color_bytes));
         columns
-            .chain(fine)
-            .chain(fine_color)
+            .chain(ranges.fine_columns(manifest.fine))
             .map(|(name, &bytes)| Self {
                 name: name.into(),
                 bytes,

@@ -4,8 +4,8 @@ mod render;
 mod table;
 
 use lodestream_protocol::{
-    Attribute, Dataset, GroupInfo, Lattice, Manifest, Method, Node, Primitive, ReadAt, Refinement,
-    Result, ScalarType, SourceInfo,
+    Attribute, Dataset, Fine, GroupInfo, Lattice, Manifest, Method, Node, Primitive, ReadAt,
+    Refinement, Result, ScalarType, SourceInfo,
 };
 use serde::Serialize;
 
@@ -184,10 +184,8 @@ fn per_point(bytes: u64, manifest: &Manifest) -> f64 {
 fn groups(manifest: &Manifest) -> Vec<GroupDescription> {
     let describe = |(index, group): (usize, &GroupInfo)| {
         let position = (index == 0).then_some("position");
-        let is_fine = manifest.fine.is_some_and(|fine| fine.group == index);
-        let fine = is_fine.then_some("position, fine");
-        let has_fine_color = is_fine && manifest.fine.is_some_and(|fine| fine.color);
-        let fine = fine.into_iter().chain(has_fine_color.then_some("color, fine"));
+        let fine = manifest.fine.filter(|fine| fine.group == index);
+        let fine = fine.map_or(&[][..], Fine::columns).iter().copied();
         let names =
             position.into_iter().chain(fine).chain(manifest.columns_of(index).map(|a| &*a.name));
         let columns = names.zip(&group.columns).map(|(name, &bytes)| ColumnDescription {

@@ -417,10 +417,13 @@ impl Loader {
         self.dispatched_at = now;
         self.take_from_prefixes(now);
         let free = self.config.requests_in_flight.max(1).saturating_sub(self.flights.len());
-        let has_room = free > 0 || {
-            let by_host = self.by_host();
-            by_host.len() > 1 && by_host.values().any(|&count| count < self.share(by_host.len()))
-        };
+        // Most engines ask one host: they need not count.
+        let has_room = free > 0
+            || self.gates.len() > 1 && {
+                let by_host = self.by_host();
+                by_host.len() > 1
+                    && by_host.values().any(|&count| count < self.share(by_host.len()))
+            };
         if has_room && self.pieces.backlog_bytes() <= MAX_BACKLOG_BYTES {
             self.start_flights(self.runs(now));
             if self.config.paces {

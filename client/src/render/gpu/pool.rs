@@ -39,11 +39,16 @@ pub struct Piece {
     pub points: u32,
 }
 
+/// How exactly points are placed, and whether their colours lack their last bits.
+const fn precision(points: &NodePoints) -> (u8, bool) {
+    (points.cell_bits, points.has_coarse_colors)
+}
+
 /// A node on the GPU.
 pub struct Resident {
     pub layout: RecordLayout,
     pub pieces: Vec<Piece>,
-    /// How exactly its points are placed, and whether their colours lack their last bits.
+    /// Of its points: see [`precision`].
     precision: (u8, bool),
     frame: u64,
     /// Keeps the address that stands for the cloud in the key from being used again.
@@ -146,7 +151,7 @@ impl Pool {
         surface: &NodeSurface,
     ) -> Option<Found<'_>> {
         let points = node.points.as_ref();
-        let precision = (points.cell_bits, points.has_coarse_colors);
+        let precision = precision(points);
         let key =
             Key { cloud: Arc::as_ptr(cloud).addr(), node: points.key, part: node.part, fields };
         // One that this frame draws already stays as it is.
@@ -187,7 +192,7 @@ impl Pool {
             self.release(old);
         }
         let pieces = self.upload(device, points.positions.len(), &layout, &words);
-        let precision = (points.cell_bits, points.has_coarse_colors);
+        let precision = precision(points);
         let resident = Resident { layout, pieces, precision, frame: 0, _cloud: Arc::clone(cloud) };
         self.nodes.put(key, resident);
         true

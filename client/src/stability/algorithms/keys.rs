@@ -8,12 +8,9 @@ use lodestream_protocol::{Lattice, MAX_SIDE_BITS, MortonCode, NodeKey};
 use super::Rows;
 use crate::stability::{
     Row, StabilityError,
-    dataset::{Built, Digits, Placed},
+    dataset::{Built, Digits, FEW_CELLS, Placed},
     exact::{big, whole},
 };
-
-/// Grid cells a node's side: few, so that small clouds have many levels.
-const GRID: u32 = 8;
 
 const REFERENCE: &str = "bit by bit, in 128-bit integers";
 const EXACT: &str = "integers: shifts and masks";
@@ -95,7 +92,7 @@ fn octants(case: &'static str, offset: i64, rng: &mut Rng) -> Result<Row, Stabil
         (0..2000).map(|_| std::array::from_fn(|_| rng.u32(..1 << LEVELS))).collect();
     let points = within.iter().map(|q| q.map(|c| offset * MM + i64::from(c))).collect();
     let digits = Digits { name: case, decimals: 3, points };
-    let built = Built::of("case.xyz", digits.text().as_bytes(), GRID)?;
+    let built = Built::of("case.xyz", digits.text().as_bytes(), FEW_CELLS)?;
     let lattice = built.dataset.manifest().lattice;
     let (placed, half) = (built.points()?, whole(1) / whole(2));
     let is_held = |point: &Placed| {

@@ -8,11 +8,9 @@ use lodestream_protocol::NodeKey;
 use super::Rows;
 use crate::stability::{
     Row,
-    dataset::{Built, Digits, Placed},
+    dataset::{Built, Digits, FEW_CELLS, Placed},
 };
 
-/// Grid cells a node's side: few, so that small clouds have many levels.
-const GRID: u32 = 8;
 const EXACT: &str = "integers: the distance holds for every pair, across nodes and chunks";
 const REFERENCE: &str = "all pairs, in 128-bit integers";
 
@@ -69,7 +67,7 @@ pub(super) fn cases() -> Rows {
 }
 
 fn row(cloud: &Digits) -> Result<Row, crate::stability::StabilityError> {
-    let built = Built::of("case.xyz", cloud.text().as_bytes(), GRID)?;
+    let built = Built::of("case.xyz", cloud.text().as_bytes(), FEW_CELLS)?;
     let manifest = built.dataset.manifest();
     let points = built.points()?;
     let lost = cloud.points.len().abs_diff(points.len());
@@ -91,7 +89,7 @@ fn row(cloud: &Digits) -> Result<Row, crate::stability::StabilityError> {
             }
             pairs += 1;
             // In lattice units; a cell is a unit at least.
-            let bits = manifest.lattice.node_bits(level).saturating_sub(GRID.ilog2() as u8);
+            let bits = manifest.lattice.node_bits(level).saturating_sub(FEW_CELLS.ilog2() as u8);
             let least = 1u128 << (2 * u32::from(bits));
             let distance: u128 = (0..3).map(|x| u128::from(a.q[x].abs_diff(b.q[x])).pow(2)).sum();
             near += usize::from(distance < least);
