@@ -107,9 +107,9 @@ fn octants(case: &'static str, offset: i64, rng: &mut Rng) -> Result<Row, Stabil
         })
     };
     let held: HashSet<usize> = placed.iter().filter(|p| is_held(p)).map(|p| p.number).collect();
-    let halves_astray = |is_wrong: &dyn Fn([f64; 3]) -> [Option<u32>; 3]| {
+    let halves_astray = |cube_of: &dyn Fn([f64; 3]) -> [Option<u32>; 3]| {
         let world = |q: [u32; 3]| q.map(|c| (offset * MM + i64::from(c)) as f64 / MM as f64);
-        within.iter().filter(|&&q| is_wrong(world(q)) != q.map(Some)).count() as f64
+        within.iter().filter(|&&q| cube_of(world(q)) != q.map(Some)).count() as f64
     };
     let side = f64::from(1u32 << LEVELS) / MM as f64;
     let low = offset as f64;
