@@ -16,6 +16,8 @@ use std::{
 };
 
 use lodestream_client::{engine::Policy, load::LoadReport};
+use lodestream_preprocess::{FileSource, with_foreign_payloads};
+use lodestream_protocol::{Dataset, Node, NodePoints};
 
 use dataset::{Recipe, dataset, write};
 use host::{Answer, Host};
@@ -234,6 +236,47 @@ fn rivals_policies_are_told_as_ratios_and_more_clients_as_a_knee() {
     assert!(potree > 2.0 * ours, "a request for every node: {potree}, ours {ours}");
     assert!(said.contains("potree against ours, 1 client, cold"), "{said}");
     assert!(said.contains("the knee is at"), "{said}");
+}
+
+#[test]
+fn nodes_in_a_rivals_encoding_are_fetched_whole_and_by_their_own_lengths() {
+    let (folder, path) = write(&dataset(recipe()));
+    let open =
+        |path: &Path| Dataset::open(FileSource::open(path).expect("readable")).expect("a dataset");
+    let encode = |points: &NodePoints| vec![7; 100 + 3 * points.positions.len()];
+    let twin = folder.path().join("twin.lods");
+    let dataset = open(&path);
+    with_foreign_payloads(&dataset, &twin, |_, points| Ok(encode(points))).expect("written");
+    let bytes = std::fs::read(&twin).expect("readable");
+    let by_key = |dataset: &Dataset<FileSource>| {
+        let mut nodes = dataset.hierarchy().expect("readable");
+        nodes.sort_unstable_by_key(|node| node.key);
+        nodes
+    };
+    let (ours, theirs) = (by_key(&dataset), by_key(&open(&twin)));
+    assert_eq!(ours.len(), theirs.len());
+    let groups: Vec<usize> = (0..dataset.manifest().groups.len()).collect();
+    let mut lengths = Vec::new();
+    for (ours, theirs) in ours.iter().zip(&theirs) {
+        let expected = encode(&dataset.read_node(ours, &groups).expect("readable"));
+        let (payload, others) = theirs.payloads.split_first().expect("a group");
+        let begin = payload.offset as usize;
+        assert!(bytes[begin..begin + payload.bytes as usize] == expected, "{theirs:?}");
+        assert!(others.iter().all(|payload| payload.bytes == 0), "{theirs:?}");
+        lengths.push(u64::from(payload.bytes));
+        let node =
+            Node { payloads: ours.payloads.clone(), child_page: ours.child_page, ..theirs.clone() };
+        assert_eq!(node, *ours);
+    }
+    let host = Host::good(bytes);
+    let opening = opening(&host);
+    let args = ["--policy", "potree", "--path", "teleport?seconds=2&stops=2", "--loops", "1"];
+    expect_success(&load(&host.url(), folder.path(), &args));
+    let report = report(folder.path());
+    let asked = host.requests().split_off(2 * opening);
+    let length = |request: &host::Request| request.range.map(|(start, end)| end - start);
+    let of_nodes = asked.iter().filter(|r| length(r).is_some_and(|len| lengths.contains(&len)));
+    assert_eq!(of_nodes.count() as u64, report.runs[0].nodes.came, "a range for every node");
 }
 
 #[test]

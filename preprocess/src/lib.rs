@@ -39,5 +39,5 @@ pub use build::{
 };
 pub use error::{Error, Result};
 pub use file::FileSource;
-pub use repack::with_whole_positions;
+pub use repack::{with_foreign_payloads, with_whole_positions};
 pub use verify::{Comparison, MAX_FINDINGS, VerifyConfig, VerifyReport, verify};

@@ -4,8 +4,9 @@
 //! without one, a simulated courtyard of 4 million points. A server of the same build hosts it in a
 //! process of its own; `lodestream load` looks at it, first with 1, 10, 100 and 1,000 clients as fast
 //! as it comes, then N times with one client by each policy on 20 Mbit/s and 40 ms, in turn. The rivals'
-//! policies know no positions in two parts: they fetch from a twin that has them in one. Server and
-//! clients share this machine. The pages stay where the last lines say.
+//! policies know no positions in two parts: they fetch from a twin that has them in one, and Potree's also from
+//! one whose nodes are what PotreeConverter 2 makes of them with `--encoding BROTLI`: its way and its bytes.
+//! Server and clients share this machine. The pages stay where the last lines say.
 
 use std::{
     error::Error,
@@ -14,8 +15,12 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use lodestream_client::load::{LoadReport, Ratios, RunReport, ratios};
-use lodestream_preprocess::{FileSource, with_whole_positions};
+use lodestream_client::{
+    engine::Policy,
+    eval::potree_payload,
+    load::{LoadReport, Ratios, RunReport, ratios},
+};
+use lodestream_preprocess::{FileSource, with_foreign_payloads, with_whole_positions};
 use lodestream_protocol::Dataset;
 use lodestream_tests::{Options, median, program};
 
@@ -69,16 +74,29 @@ fn main() -> Result<()> {
     let twin_folder = folder.join("bench_load_twin");
     std::fs::create_dir_all(&twin_folder)?;
     let twin = twin_folder.join("whole.lods");
-    with_whole_positions(&Dataset::open(FileSource::open(&dataset)?)?, &twin)?;
-    let twin = Server::start(&twin)?;
+    let foreign = twin_folder.join("potree.lods");
+    let opened = Dataset::open(FileSource::open(&dataset)?)?;
+    with_whole_positions(&opened, &twin)?;
+    with_foreign_payloads(&opened, &foreign, potree_payload)?;
+    let size = |path: &Path| std::fs::metadata(path).map(|file| file.len() as f64 / 1e6);
+    println!(
+        "\n{:.1} MB; in one part {:.1} MB, in Potree's encoding {:.1} MB",
+        size(&dataset)?,
+        size(&twin)?,
+        size(&foreign)?
+    );
+    let (twin, foreign) = (Server::start(&twin)?, Server::start(&foreign)?);
     let mut rounds = Vec::new();
     for run in 1..=runs {
         let fetch = |server: &Server, policies: &str| {
-            let folder = folder.join(format!("bench_load_{}_{run}", policies.replace(',', "_")));
-            load(server, &folder, &[&FETCHES[..], &["--policy", policies]].concat())
+            let name = format!("bench_load_{}_{}_{run}", server.name, policies.replace(',', "_"));
+            load(server, &folder.join(name), &[&FETCHES[..], &["--policy", policies]].concat())
         };
-        let (ours, theirs) = (fetch(&server, "ours")?, fetch(&twin, "potree,fraiss")?);
-        rounds.push(ratios(&[ours.runs, theirs.runs].concat()));
+        let mut all = fetch(&server, "ours")?.runs;
+        let by_its_bytes = fetch(&foreign, "potree")?.runs.into_iter();
+        all.extend(by_its_bytes.map(|run| RunReport { policy: Policy::PotreeBrotli, ..run }));
+        all.extend(fetch(&twin, "potree,fraiss")?.runs);
+        rounds.push(ratios(&all));
     }
     println!("\nTimes ours, medians of {runs} (each run's median over its pictures):\n");
     println!(

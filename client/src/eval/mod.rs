@@ -2,7 +2,7 @@
 //!
 //! - `views.rs`: where pictures are taken from, by rule;
 //! - `subject.rs`: a dataset and the truth of any view of it;
-//! - `potree.rs`: what a node weighs in a rival's encoding;
+//! - `potree.rs`: a node in a rival's encoding, and what that weighs;
 //! - `frame.rs`: milliseconds per frame and error;
 //! - `stream.rs`: error over time while a view streams in;
 //! - `along.rs`: error along a camera path, without waiting;
@@ -30,6 +30,7 @@ pub use curve::{Reached, Sample, area, bytes_at_equal_error, pareto, reached};
 pub use frame::FrameRow;
 pub use left_out::{Cost, NotStored, SavingRow};
 pub use page::page;
+pub use potree::payload as potree_payload;
 pub use report::{BuildRow, Entrant, NoiseRow, Race, Report, SubjectReport};
 pub use run::{EvalConfig, Exhibit, run};
 pub use stream::{LEVELS, Stop, StreamRun, Streaming};

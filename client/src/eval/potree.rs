@@ -47,11 +47,14 @@ pub fn weigh<R: ReadAt + Sync>(dataset: &Dataset<R>, shown: &[usize]) -> anyhow:
     };
     let encode = |node: &Node| {
         let points = dataset.read_node(node, &groups)?;
-        let all = compressed(&columns(manifest, &points, |_| true))?;
+        let all = payload(manifest, &points)?.len() as u64;
         let shows_all =
             points.columns.iter().all(|column| is_shown(&manifest.attributes[column.attribute]));
-        let shown =
-            if shows_all { all } else { compressed(&columns(manifest, &points, is_shown))? };
+        let shown = if shows_all {
+            all
+        } else {
+            compressed(&columns(manifest, &points, is_shown))?.len() as u64
+        };
         Ok((node.payloads.first().map(|payload| (payload.offset, all)), shown))
     };
     let nodes = dataset.hierarchy()?;
@@ -60,6 +63,14 @@ pub fn weigh<R: ReadAt + Sync>(dataset: &Dataset<R>, shown: &[usize]) -> anyhow:
         shown: weighed.iter().map(|(_, shown)| shown).sum(),
         nodes: Arc::new(weighed.into_iter().filter_map(|(node, _)| node).collect()),
     })
+}
+
+/// A node as the converter stores it.
+///
+/// # Errors
+/// None that a machine with enough memory has.
+pub fn payload(manifest: &Manifest, points: &NodePoints) -> io::Result<Vec<u8>> {
+    compressed(&columns(manifest, points, |_| true))
 }
 
 /// The columns of a node before they are compressed, one after the other; of attributes that are kept.
@@ -107,31 +118,17 @@ fn interleaved(color: [u32; 3]) -> [u8; 8] {
     u64::encode(color).to_le_bytes()
 }
 
-/// How many bytes they compress to.
-fn compressed(mut bytes: &[u8]) -> io::Result<u64> {
+/// What they compress to.
+fn compressed(mut bytes: &[u8]) -> io::Result<Vec<u8>> {
     let parameters = brotli::enc::BrotliEncoderParams {
         quality: QUALITY,
         lgwin: WINDOW_BITS,
         size_hint: bytes.len(),
         ..Default::default()
     };
-    let mut counted = Counted(0);
-    brotli::BrotliCompress(&mut bytes, &mut counted, &parameters)?;
-    Ok(counted.0)
-}
-
-/// Counts what is written to it.
-struct Counted(u64);
-
-impl io::Write for Counted {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0 += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
+    let mut compressed = Vec::new();
+    brotli::BrotliCompress(&mut bytes, &mut compressed, &parameters)?;
+    Ok(compressed)
 }
 
 #[cfg(test)]
@@ -196,8 +193,8 @@ mod tests {
     #[test]
     fn what_is_alike_weighs_little_and_what_is_random_all_of_it() {
         let random: Vec<u8> = std::iter::repeat_with(|| fastrand::u8(..)).take(10_000).collect();
-        assert!(compressed(&random).expect("compressed") >= 10_000);
-        assert!(compressed(&[7; 10_000]).expect("compressed") < 100);
+        assert!(compressed(&random).expect("compressed").len() >= 10_000);
+        assert!(compressed(&[7; 10_000]).expect("compressed").len() < 100);
         assert_eq!("potree-brotli".parse(), Ok(Policy::PotreeBrotli));
     }
 }
