@@ -5,7 +5,8 @@
 //! by turns, so that a drift of the machine's speed meets both: first from processors of its own, then from the
 //! same ones, where the threads that are busy wait for each other (with few connections nginx has often all of
 //! them on one worker, so that fewer threads share the processors: its requests are slower then, its slowest
-//! faster). Then many nodes of 16 KiB by batches,
+//! faster). The slowest hundredth is decided by whatever else takes a processor for a millisecond: behind its
+//! medians stand quartiles, and in how many turns ours was the slower. Then many nodes of 16 KiB by batches,
 //! beside nginx's by ranges, both asked by a load generator of this bench: wrk takes answers in pieces of 8
 //! KiB, which costs it more for a node than the server, and would be what is measured. At last, what
 //! batches are worth to the client's engine, on INPUT (a dataset or anything that `lodestream build` takes;
@@ -58,7 +59,8 @@ fn main() -> Result<()> {
     write_file(&folder.path().join("bench.lods"))?;
     let processors = std::thread::available_parallelism()?.get();
     println!(
-        "{}, {processors} cores, medians of {runs} runs of {SECONDS} s by turns; ratios are ours to nginx's",
+        "{}, {processors} cores, medians of {runs} runs of {SECONDS} s by turns (quartiles behind them); ratios are \
+         ours to nginx's; slower: turns in which ours was",
         Nginx::version()?,
     );
     if let Some((servers, generators)) = halves(processors) {
@@ -84,6 +86,7 @@ fn main() -> Result<()> {
             || ask(ours_at, &batches, connections, &our_pids),
             || ask(theirs_at, &ranges, connections, &their_pids),
         )?;
+        let (us, them) = (middle(&us), middle(&them));
         let nodes = us.rate * NODES as f64;
         println!(
             "| {connections} | {nodes:.0} | {:.0} | {:.2} | {:.1} | {:.1} |",
@@ -141,9 +144,9 @@ fn ranges(
     runs: usize,
 ) -> Result<()> {
     println!(
-        "| KiB | connections | requests/s | nginx | ratio | p99 ms | nginx | ratio | server's µs/request | nginx |"
+        "| KiB | connections | requests/s | nginx | ratio | slower | p90 ms | nginx | p99 ms | nginx | ratio | slower | server's µs/request | nginx |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    println!("|{}", " --- |".repeat(14));
     let folder = tempfile::tempdir()?;
     let (our_url, their_url) =
         (format!("{}/bench.lods", ours.url), format!("http://{}/bench.lods", rival.addr));
@@ -157,17 +160,32 @@ fn ranges(
                 || load(&our_url, &script, connections, generators, &our_pids),
                 || load(&their_url, &script, connections, generators, &their_pids),
             )?;
+            let slower = |is_slower: fn(&Load, &Load) -> bool| {
+                us.iter().zip(&them).filter(|(us, them)| is_slower(us, them)).count()
+            };
+            let (slower_rate, slower_p99) = (
+                slower(|us, them| us.rate < them.rate),
+                slower(|us, them| us.p99_ms > them.p99_ms),
+            );
+            let p99 = |loads: &[Load]| {
+                let [low, middle, high] = quartiles(loads, |load| load.p99_ms);
+                format!("{middle:.2} ({low:.2}-{high:.2})")
+            };
+            let (ours, theirs) = (middle(&us), middle(&them));
             println!(
-                "| {} | {connections} | {:.0} | {:.0} | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} |",
+                "| {} | {connections} | {:.0} | {:.0} | {:.2} | {slower_rate} | {:.2} | {:.2} | {} | {} | {:.2} | \
+                 {slower_p99} | {:.1} | {:.1} |",
                 size >> 10,
-                us.rate,
-                them.rate,
-                us.rate / them.rate,
-                us.p99_ms,
-                them.p99_ms,
-                us.p99_ms / them.p99_ms,
-                us.cpu_us,
-                them.cpu_us
+                ours.rate,
+                theirs.rate,
+                ours.rate / theirs.rate,
+                ours.p90_ms,
+                theirs.p90_ms,
+                p99(&us),
+                p99(&them),
+                ours.p99_ms / theirs.p99_ms,
+                ours.cpu_us,
+                theirs.cpu_us
             );
         }
     }
@@ -242,6 +260,7 @@ impl Drop for Server {
 #[derive(Debug, Clone, Copy)]
 struct Load {
     rate: f64,
+    p90_ms: f64,
     p99_ms: f64,
     /// The server's processor time for each request.
     cpu_us: f64,
@@ -251,19 +270,41 @@ fn by_turns(
     runs: usize,
     ours: impl Fn() -> Result<Load>,
     theirs: impl Fn() -> Result<Load>,
-) -> Result<(Load, Load)> {
+) -> Result<(Vec<Load>, Vec<Load>)> {
     // Once in vain: files are opened, buffers grow, the dataset earns its copy.
     ours()?;
     let (mut us, mut them) = (Vec::new(), Vec::new());
-    for _ in 0..runs {
-        us.push(ours()?);
-        them.push(theirs()?);
+    for turn in 0..runs {
+        // Neither is always the first.
+        if turn % 2 == 0 {
+            us.push(ours()?);
+            them.push(theirs()?);
+        } else {
+            them.push(theirs()?);
+            us.push(ours()?);
+        }
     }
-    let middle = |loads: &[Load]| {
-        let of = |value: fn(&Load) -> f64| median(&mut loads.iter().map(value).collect::<Vec<_>>());
-        Load { rate: of(|l| l.rate), p99_ms: of(|l| l.p99_ms), cpu_us: of(|l| l.cpu_us) }
-    };
-    Ok((middle(&us), middle(&them)))
+    Ok((us, them))
+}
+
+/// Each figure's median.
+fn middle(loads: &[Load]) -> Load {
+    let of = |value: fn(&Load) -> f64| median(&mut loads.iter().map(value).collect::<Vec<_>>());
+    Load {
+        rate: of(|l| l.rate),
+        p90_ms: of(|l| l.p90_ms),
+        p99_ms: of(|l| l.p99_ms),
+        cpu_us: of(|l| l.cpu_us),
+    }
+}
+
+/// The medians of the lower half, of all, and of the upper half.
+fn quartiles(loads: &[Load], value: fn(&Load) -> f64) -> [f64; 3] {
+    let mut values: Vec<f64> = loads.iter().map(value).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let half = values.len().div_ceil(2);
+    let (low, high) = (values[..half].to_vec(), values[values.len() - half..].to_vec());
+    [low, values, high].map(|mut values| median(&mut values))
 }
 
 fn load(
@@ -301,6 +342,7 @@ fn load(
     let requests: f64 = requests.ok_or("wrk tells no number of requests")?.0.trim().parse()?;
     Ok(Load {
         rate: after("Requests/sec:")?.parse()?,
+        p90_ms: milliseconds(after("90%")?)?,
         p99_ms: milliseconds(after("99%")?)?,
         // A tick is a hundredth of a second on every Linux.
         cpu_us: ticks as f64 * 10_000.0 / requests,
@@ -413,10 +455,14 @@ fn ask(addr: SocketAddr, requests: &[Vec<u8>], connections: u32, pids: &[u32]) -
     let seconds = begin.elapsed().as_secs_f64();
     let ticks = ticks(pids) - before;
     waits.sort_unstable();
-    let p99 = waits.get(waits.len() * 99 / 100).ok_or("nothing was answered")?;
+    let within = |percent: usize| -> Result<f64> {
+        let wait = waits.get(waits.len() * percent / 100).ok_or("nothing was answered")?;
+        Ok(wait.as_secs_f64() * 1e3)
+    };
     Ok(Load {
         rate: waits.len() as f64 / seconds,
-        p99_ms: p99.as_secs_f64() * 1e3,
+        p90_ms: within(90)?,
+        p99_ms: within(99)?,
         cpu_us: ticks as f64 * 10_000.0 / waits.len() as f64,
     })
 }
