@@ -3,7 +3,7 @@
 //! `./dev bench load [INPUT] [--runs N]`. INPUT is a dataset or anything that `lodestream build` takes;
 //! without one, a simulated courtyard of 4 million points. A server of the same build hosts it in a
 //! process of its own; `lodestream load` looks at it, first with 1, 10, 100 and 1,000 clients as fast
-//! as it comes, then N times with one client by each policy on 20 Mbit/s and 40 ms, in turn. The rivals'
+//! as it comes, then N times with six clients by each policy, each of them on 20 Mbit/s and 40 ms, in turn. The rivals'
 //! policies know no positions in two parts: they fetch from a twin that has them in one, and Potree's also from
 //! one whose nodes are what PotreeConverter 2 makes of them with `--encoding BROTLI`: its way and its bytes.
 //! Server and clients share this machine. The pages stay where the last lines say.
@@ -34,10 +34,11 @@ const CLIENTS: &str = "1,10,100,1000";
 const HOLDS: [&str; 8] =
     ["--path", "orbit?seconds=30", "--duration", "40", "--ramp", "10", "--views-per-second", "5"];
 
-/// The second part: six places, each stayed at for ten seconds.
+/// The second part: six places, each stayed at for ten seconds, and a client that begins at each, by a link of
+/// its own.
 const FETCHES: [&str; 8] = [
     "--clients",
-    "1",
+    "6",
     "--path",
     "teleport?seconds=60&stops=6&factor=10",
     "--loops",
