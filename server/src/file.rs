@@ -66,7 +66,13 @@ pub(crate) enum OpenError {
     Missing,
     /// It is there, but no sound dataset (yet): the reason.
     Unreadable(String),
+    /// The object store does not answer as it should. The log has been told why: that has addresses and
+    /// more that clients need not know.
+    Unanswered,
 }
+
+/// What clients are told of [`OpenError::Unanswered`].
+pub(crate) const UNANSWERED: &str = "the object store does not answer as it should";
 
 impl DatasetFile {
     /// Opens the file and looks at its header.

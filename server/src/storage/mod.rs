@@ -135,10 +135,11 @@ impl Storage {
         listing.await.map_err(io::Error::other).flatten()
     }
 
-    /// Makes ready for looking at all of these, one by one.
-    pub(crate) async fn warm(&self, file_names: &[String]) {
-        if let Self::Objects(objects) = self {
-            objects.warm(file_names).await;
+    /// Makes ready for looking at all of these, one by one; returns those that are not to be had.
+    pub(crate) async fn warm(&self, file_names: &[String]) -> HashSet<String> {
+        match self {
+            Self::Folder(..) => HashSet::new(),
+            Self::Objects(objects) => objects.warm(file_names).await,
         }
     }
 
