@@ -4,7 +4,7 @@
 //! ready from thread to thread, which costs more than it evens out, and where the system takes the processor from
 //! the thread that polls, all connections wait. Here a thread polls for its own connections alone, as nginx's
 //! processes do. Nothing may wait on these threads: reads that would are for the blocking pool, as are the short calls of the
-//! file system once several [were slow](crate::offload).
+//! file system unless it is of this machine's disks and [quick](crate::offload).
 
 use std::{io, num::NonZero, sync::Arc, thread};
 

@@ -196,8 +196,9 @@ impl Storage {
         match self {
             Self::Folder(folder, open_files) => {
                 let path = folder.path_of(file_name).ok_or(OpenError::Missing)?;
-                let open_files = Arc::clone(open_files);
-                offload.run(move || open_files.open(path)).await
+                let (open_files, known) = (Arc::clone(open_files), open_files.known(&path));
+                let is_local = known.as_ref().is_some_and(|(_, file)| file.is_local);
+                offload.run(is_local, move || open_files.open(path, known)).await
             }
             Self::Objects(objects) => {
                 let object = objects.dataset(file_name).await?;
