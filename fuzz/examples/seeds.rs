@@ -1,11 +1,14 @@
 //! Writes the first inputs of every target: `cargo run --example seeds -- DATASET.lods fuzz/seeds`.
 //!
-//! From the dataset: its boot block, its pages, the payloads of a few nodes. From nowhere: columns
-//! of every scalar type, which no single dataset holds.
+//! From the dataset, which is to be a small one (`build 'sim:courtyard?points=6000' --grid 32`): its boot block,
+//! its pages, the payloads of a few nodes. From nowhere: columns of every scalar type, which no single dataset
+//! holds, and rights to be signed.
 
 use std::{error::Error, fs, path::Path};
 
-use lodestream_fuzz::{BootInput, ColumnsInput, HierarchyInput, leaf, manifest};
+use lodestream_fuzz::{
+    BootInput, ColumnsInput, HierarchyInput, LinkInput, in_parts, leaf, manifest,
+};
 use lodestream_protocol::{
     Attribute, Boot, Dataset, Domain, HEADER_BYTES, HierarchyPage, Node, NodeKey, NormalCone,
     PageRef, PayloadRef, Primitive, ReadAt, ScalarType, Storage, decode_unchecked, encode_column,
@@ -17,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [dataset, out] = &arguments[..] else { return Err("usage: seeds DATASET OUT".into()) };
     let dataset = Dataset::open(fs::read(dataset)?)?;
     let out = Path::new(out);
-    for target in ["boot", "hierarchy", "columns"] {
+    for target in ["boot", "hierarchy", "columns", "signature"] {
         fs::create_dir_all(out.join(target))?;
     }
 
@@ -40,12 +43,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     for level in 0..manifest.levels {
         let of_level = nodes.iter().filter(|node| node.key.level() == level);
         let Some(node) = of_level.min_by_key(|node| node.points) else { continue };
-        let payload = &node.payloads[0];
-        let payload = dataset.source().read_at(payload.offset, payload.bytes as usize)?;
-        let (manifest, node) = (manifest.clone(), node.clone());
-        let input = ColumnsInput { manifest, node, payload: &payload };
-        write_columns(&out.join(format!("columns/dataset_level_{level}")), &input)?;
+        for (part, group) in [("", Some(0)), ("_fine", manifest.fine.map(|fine| fine.group))] {
+            let payload = group.map(|group| &node.payloads[group]).filter(|p| p.bytes > 0);
+            let Some(payload) = payload else { continue };
+            let payload = dataset.source().read_at(payload.offset, payload.bytes as usize)?;
+            let (manifest, node) = (manifest.clone(), node.clone());
+            let input = ColumnsInput { manifest, node, payload: &payload };
+            write_columns(&out.join(format!("columns/dataset_level_{level}{part}")), &input)?;
+        }
     }
+
+    write_links(&out.join("signature"))?;
 
     for scalar in ScalarType::ALL {
         let name = format!("{scalar:?}").to_lowercase();
@@ -60,6 +68,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         attribute("a1", ScalarType::U8, 4, Domain::Texel),
     ];
     write_made(&out.join("columns/texture"), textured, Primitive::Rectangle, 32)
+}
+
+/// Writes rights as they are signed, one of them altered and with the fields of another behind it.
+fn write_links(folder: &Path) -> Result<(), Box<dyn Error>> {
+    const ANOTHER: &[u8] = b"&v=0&datasets=%2A&expires=2000";
+    let link = LinkInput { datasets: "site-*", expires: 1000, edits: &[], suffix: &[] };
+    let name = LinkInput { datasets: "a", expires: u64::MAX, ..link };
+    let altered =
+        LinkInput { edits: &[9, 0, b'*', 40, 1, 0, 50, 2, b'%'], suffix: ANOTHER, ..link };
+    for (file_name, input) in [("prefix", link), ("name", name), ("altered", altered)] {
+        fs::write(folder.join(file_name), input.to_bytes().ok_or("too large for a seed")?)?;
+    }
+    Ok(())
 }
 
 /// Writes a tree of two pages, which a small dataset never has.
@@ -124,6 +145,9 @@ fn write_made(
 fn write_columns(path: &Path, input: &ColumnsInput<'_>) -> Result<(), Box<dyn Error>> {
     let bytes = input.to_bytes().ok_or("more columns than an input of `columns` can name")?;
     let back = ColumnsInput::parse(&bytes).ok_or("the seed describes no manifest")?;
-    decode_unchecked(&back.manifest, 0, &back.node, back.payload)?;
+    let read =
+        |manifest, group| decode_unchecked(manifest, group, &back.node, back.payload).map(drop);
+    let parted = in_parts(&back.manifest);
+    read(&back.manifest, 0).or_else(|_| read(&parted, 0)).or_else(|_| read(&parted, 1))?;
     Ok(fs::write(path, bytes)?)
 }

@@ -2,18 +2,12 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use lodestream_fuzz::ColumnsInput;
-use lodestream_protocol::{
-    Domain, Fine, GroupInfo, Manifest, Node, decode_unchecked, encode_column,
-};
+use lodestream_fuzz::{ColumnsInput, in_parts};
+use lodestream_protocol::{Domain, Manifest, Node, decode_unchecked, encode_column};
 
 /// The same bytes, as where the points lie in their cells and what their colours lack.
-fn fine_parts(manifest: &Manifest, node: &Node, payload: &[u8]) {
-    let mut manifest = manifest.clone();
-    let group = manifest.groups.len();
-    manifest.groups.push(GroupInfo { name: "fine".into(), columns: vec![0, 0] });
-    manifest.fine = Some(Fine { group, color: true, cells_per_spacing: 2 });
-    let Ok(decoded) = decode_unchecked(&manifest, group, node, payload) else { return };
+fn second_part(manifest: &Manifest, node: &Node, payload: &[u8]) {
+    let Ok(decoded) = decode_unchecked(manifest, 1, node, payload) else { return };
     if let Some(colors) = decoded.fine_colors {
         let bytes = manifest.attributes[colors.attribute].value_bytes() * node.points as usize;
         colors.refine(&mut vec![0; bytes]).expect("as many as the node has");
@@ -24,10 +18,9 @@ fn fine_parts(manifest: &Manifest, node: &Node, payload: &[u8]) {
     assert!(fine.offsets.iter().all(inside), "a position outside its cell");
 }
 
-fuzz_target!(|data: &[u8]| {
-    let Some(ColumnsInput { manifest, node, payload }) = ColumnsInput::parse(data) else { return };
-    fine_parts(&manifest, &node, payload);
-    let Ok(decoded) = decode_unchecked(&manifest, 0, &node, payload) else { return };
+/// All that a node has, or what comes first of it.
+fn first_part(manifest: &Manifest, node: &Node, payload: &[u8]) {
+    let Ok(decoded) = decode_unchecked(manifest, 0, node, payload) else { return };
     let count = node.points as usize;
     assert_eq!(decoded.positions.len(), count);
     let bits = manifest.lattice.node_bits(node.key.level());
@@ -42,4 +35,12 @@ fuzz_target!(|data: &[u8]| {
             encode_column(&mut Vec::new(), attribute, &column.bytes).expect("a decoded column");
         }
     }
+}
+
+fuzz_target!(|data: &[u8]| {
+    let Some(ColumnsInput { manifest, node, payload }) = ColumnsInput::parse(data) else { return };
+    first_part(&manifest, &node, payload);
+    let parted = in_parts(&manifest);
+    first_part(&parted, &node, payload);
+    second_part(&parted, &node, payload);
 });

@@ -1,7 +1,7 @@
 //! Input of the target `columns`.
 
 use lodestream_protocol::{
-    Attribute, Domain, Manifest, Node, NodeKey, Primitive, ScalarType, Storage,
+    Attribute, Domain, Fine, GroupInfo, Manifest, Node, NodeKey, Primitive, ScalarType, Storage,
 };
 
 use crate::{leaf, manifest};
@@ -95,6 +95,17 @@ impl<'a> ColumnsInput<'a> {
         bytes.extend_from_slice(self.payload);
         Some(bytes)
     }
+}
+
+/// The manifest of a dataset that has positions and colours in two parts; `manifest` is of one that has
+/// them in one. The second part is its last group.
+#[must_use]
+pub fn in_parts(manifest: &Manifest) -> Manifest {
+    let mut manifest = manifest.clone();
+    let group = manifest.groups.len();
+    manifest.groups.push(GroupInfo { name: "fine".into(), columns: vec![0, 0] });
+    manifest.fine = Some(Fine { group, color: true, cells_per_spacing: 2 });
+    manifest
 }
 
 fn constant(name: &str, components: u8) -> Attribute {

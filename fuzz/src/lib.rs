@@ -4,9 +4,11 @@
 //! them and is sealed anew here. `seeds` (an example of this crate) writes the first inputs.
 
 mod columns;
+mod links;
 mod pages;
 
-pub use columns::ColumnsInput;
+pub use columns::{ColumnsInput, in_parts};
+pub use links::LinkInput;
 pub use pages::{BootInput, HierarchyInput};
 
 use lodestream_protocol::{

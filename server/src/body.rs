@@ -32,6 +32,7 @@ use tokio::task::JoinHandle;
 use crate::{
     buffers::{Buffer, BufferPool, PIECE_BYTES},
     file::DatasetFile,
+    storage::Source,
 };
 
 /// What a response is made of.
@@ -248,8 +249,11 @@ fn read_waiting(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::
 }
 
 /// Reads some bytes that can be had without waiting for the disk; at least one. Where the file system
-/// cannot tell, there are none.
+/// cannot tell, there are none; nor where it may wait to tell whether the file is unchanged.
 fn read_cached(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::Result<usize> {
+    if matches!(file.source, Source::File(_)) && !file.is_local {
+        return Err(io::ErrorKind::WouldBlock.into());
+    }
     match file.source.read_cached(buffer, rest.start)? {
         0 => Err(io::ErrorKind::WouldBlock.into()),
         count => Ok(count),
@@ -263,8 +267,6 @@ mod tests {
 
     use lodestream_preprocess::FileSource;
     use lodestream_protocol::Header;
-
-    use crate::storage::Source;
 
     /// A file of 64 KiB of ones behind a header.
     fn dataset(folder: &tempfile::TempDir) -> DatasetFile {

@@ -18,6 +18,7 @@ use hyper_util::{
     server::graceful::Watcher,
     service::TowerToHyperService,
 };
+use prometheus_client::metrics::gauge::Gauge;
 use tokio::{
     io::{AsyncRead, AsyncReadExt, AsyncWrite},
     net::TcpStream,
@@ -76,11 +77,26 @@ pub(crate) async fn serve(
 ) {
     let metrics = &host.site.metrics;
     metrics.accepted.inc();
-    metrics.connections.inc();
+    let _standing = Standing::begin(&metrics.connections);
     if let Err(e) = converse(stream, address, &host, watcher, stopping).await {
         tracing::debug!("connection of {address} ended: {e}");
     }
-    metrics.connections.dec();
+}
+
+/// A connection that is counted until it ends, by a panic or cut off, too.
+struct Standing<'a>(&'a Gauge);
+
+impl<'a> Standing<'a> {
+    fn begin(gauge: &'a Gauge) -> Self {
+        gauge.inc();
+        Self(gauge)
+    }
+}
+
+impl Drop for Standing<'_> {
+    fn drop(&mut self) {
+        self.0.dec();
+    }
 }
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;

@@ -13,6 +13,7 @@ use lodestream_protocol::{Error as FormatError, HEADER_BYTES, Header};
 
 use crate::{
     conditional::{Validators, http_date},
+    disk,
     private_copy::CopyState,
     storage::{Object, Source},
 };
@@ -32,6 +33,8 @@ pub(crate) struct DatasetFile {
     /// The modification time as a response carries it.
     pub(crate) last_modified: Option<HeaderValue>,
     pub(crate) private_copy: CopyState,
+    /// Whether it is a file on a disk of this machine.
+    pub(crate) is_local: bool,
     /// Length and modification time when it was opened, of a file of this machine.
     opened_as: Option<(u64, Option<SystemTime>)>,
 }
@@ -66,12 +69,19 @@ pub(crate) enum OpenError {
     Missing,
     /// It is there, but no sound dataset (yet): the reason.
     Unreadable(String),
+    /// The object store does not answer as it should. The log has been told why: that has addresses and
+    /// more that clients need not know.
+    Unanswered,
 }
+
+/// What clients are told of [`OpenError::Unanswered`].
+pub(crate) const UNANSWERED: &str = "the object store does not answer as it should";
 
 impl DatasetFile {
     /// Opens the file and looks at its header.
     pub(crate) fn open(path: PathBuf) -> Result<(Identity, Self), OpenError> {
         let (file, metadata) = open_regular(&path)?;
+        let is_local = path.parent().is_some_and(|folder| disk::is_local(&file, folder));
         let source = FileSource::from(file);
         let mut head = [0; HEADER_BYTES];
         let read = source.read_into(&mut head, 0).map_err(unreadable)?;
@@ -87,6 +97,7 @@ impl DatasetFile {
         let modified = metadata.modified().ok();
         let mut file = Self::sound(path, Source::File(source), &header, modified)?;
         file.opened_as = Some((length, modified));
+        file.is_local = is_local;
         Ok((Identity::of(&metadata), file))
     }
 
@@ -115,6 +126,7 @@ impl DatasetFile {
             etag: HeaderValue::from_str(&validators.etag).map_err(unreadable)?,
             last_modified: validators.modified.and_then(|m| m.to_string().try_into().ok()),
             private_copy: CopyState::default(),
+            is_local: false,
             opened_as: None,
             validators,
         })

@@ -1,6 +1,11 @@
 //! The list of datasets.
 
-use std::{collections::HashMap, io, sync::Arc, time::SystemTime};
+use std::{
+    collections::{HashMap, HashSet},
+    io,
+    sync::Arc,
+    time::SystemTime,
+};
 
 use lodestream_protocol::{Attribute, Dataset, ScalarType};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
@@ -11,7 +16,7 @@ use utoipa::ToSchema;
 use crate::{
     access::Rights,
     conditional::http_date,
-    file::OpenError,
+    file::{OpenError, UNANSWERED},
     storage::{Identity, Listing, Readable, SUFFIX, Source, Storage, dataset_name},
 };
 
@@ -128,8 +133,9 @@ impl IndexCache {
                 known.get(*name).is_some_and(|known| listing.is_still(name, &known.identity))
             };
             let new = listing.datasets.iter().filter(|name| !is_still(name));
-            storage.warm(&new.cloned().collect::<Vec<_>>()).await;
-            let looking = tokio::task::spawn_blocking(move || look(&storage, &listing, known));
+            let unanswered = storage.warm(&new.cloned().collect::<Vec<_>>()).await;
+            let look = move || look(&storage, &listing, known, &unanswered);
+            let looking = tokio::task::spawn_blocking(look);
             let (index, known) = looking.await.map_err(io::Error::other)?;
             *entries = known;
             Ok(index)
@@ -143,20 +149,27 @@ fn look(
     storage: &Storage,
     listing: &Listing,
     mut known: HashMap<String, Known>,
+    unanswered: &HashSet<String>,
 ) -> (DatasetIndex, HashMap<String, Known>) {
     let mut index = DatasetIndex::default();
     let mut entries = HashMap::with_capacity(listing.datasets.len());
     for file_name in &listing.datasets {
-        match look_at(storage, listing, file_name, known.remove(file_name)) {
+        let known = known.remove(file_name);
+        let found = match unanswered.contains(file_name) {
+            true => Err(OpenError::Unanswered),
+            false => look_at(storage, listing, file_name, known),
+        };
+        let reason = match found {
             Ok(found) => {
                 index.datasets.push(found.entry.clone());
                 entries.insert(file_name.clone(), found);
+                continue;
             }
-            Err(OpenError::Missing) => {}
-            Err(OpenError::Unreadable(reason)) => {
-                index.unreadable.push(UnreadableEntry { file: file_name.clone(), reason });
-            }
-        }
+            Err(OpenError::Missing) => continue,
+            Err(OpenError::Unreadable(reason)) => reason,
+            Err(OpenError::Unanswered) => UNANSWERED.to_owned(),
+        };
+        index.unreadable.push(UnreadableEntry { file: file_name.clone(), reason });
     }
     (index, entries)
 }

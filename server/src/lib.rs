@@ -28,6 +28,7 @@ mod conditional;
 mod config;
 mod connection;
 pub mod describe;
+mod disk;
 mod error;
 mod file;
 mod hot;

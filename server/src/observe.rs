@@ -190,26 +190,56 @@ impl HttpBody for ObservedBody {
 mod tests {
     use std::{future::pending, net::SocketAddr};
 
-    use axum::{Router, middleware::from_fn_with_state, routing::get};
+    use axum::{
+        Router,
+        middleware::from_fn_with_state,
+        routing::{MethodRouter, get},
+    };
     use hyper::service::Service;
     use hyper_util::service::TowerToHyperService;
 
     use super::*;
     use crate::ServeConfig;
 
-    #[tokio::test]
-    async fn who_goes_away_before_the_response_is_counted() {
+    fn site() -> (tempfile::TempDir, Arc<Site>) {
         let folder = tempfile::tempdir().expect("temporary");
         let config = ServeConfig::new(folder.path(), SocketAddr::from(([127, 0, 0, 1], 0)));
         let site = Site::open(&config).expect("a folder");
+        (folder, site)
+    }
+
+    async fn ask(site: &Arc<Site>, handler: MethodRouter) -> Response {
         let router = Router::new()
-            .route("/healthz", get(pending::<()>))
-            .layer(from_fn_with_state(Arc::clone(&site), observe));
+            .route("/healthz", handler)
+            .layer(from_fn_with_state(Arc::clone(site), observe));
         let request = Request::get("/healthz").body(Body::empty()).expect("a request");
-        let answer = TowerToHyperService::new(router).call(request);
+        let answer = TowerToHyperService::new(router).call(request).await;
+        answer.unwrap_or_else(|never| match never {})
+    }
+
+    #[tokio::test]
+    async fn who_goes_away_before_the_response_is_counted() {
+        let (_folder, site) = site();
+        let answer = ask(&site, get(pending::<()>));
         let waiting = tokio::time::timeout(Duration::from_millis(10), answer);
         assert!(waiting.await.is_err(), "never answered");
         let figures = site.metrics.render();
         assert!(figures.contains("status=\"499\"} 1"), "{figures}");
+    }
+
+    #[tokio::test]
+    async fn a_handler_that_panics_is_counted_as_the_servers_fault() {
+        async fn panics() {
+            panic!("as a test");
+        }
+        let (_folder, site) = site();
+        let asking = {
+            let site = Arc::clone(&site);
+            tokio::spawn(async move { ask(&site, get(panics)).await })
+        };
+        assert!(asking.await.is_err_and(|e| e.is_panic()), "it goes on to the connection's task");
+        let figures = site.metrics.render();
+        assert!(figures.contains("status=\"500\"} 1"), "{figures}");
+        assert!(figures.contains("responses_broken_total{dataset=\"\",kind=\"operation\"} 1"));
     }
 }

@@ -1,10 +1,18 @@
 //! Where short file-system calls run: in place while they are quick, else on the blocking pool.
 //!
 //! Opening a file whose directory entry is cached takes microseconds; a hop to the blocking pool
-//! and back costs several times as much, on every request. On a network file system the same call
-//! may take milliseconds, during which a runtime thread would serve nobody else. So calls run in
-//! place until several were slow, and on the pool until most are quick again. One slow call says
-//! nothing: on a busy machine, the thread may just have lost its processor for a while.
+//! and back costs several times as much, on every request. On a slow disk the same call may take
+//! milliseconds, during which a runtime thread would serve nobody else. So calls run in place until
+//! several were slow, and on the pool until most are quick again. One slow call says nothing: on a
+//! busy machine, the thread may just have lost its processor for a while.
+//!
+//! A server of files that has gone away keeps a call for minutes, or for good. No earlier call tells
+//! of that, and under load every thread has its next one out before anyone can know, with health,
+//! figures, timeouts and all other connections stuck behind it. So only what is known to lie on a
+//! [disk of this machine](crate::disk) is asked in place, and anything else on the pool whatever its
+//! time: there a hung call costs a thread that nobody waits for, and the client is answered when its
+//! time is over. (Tried with a FUSE file system that stops to answer under load: in place, not even
+//! `/healthz` was answered any more.)
 
 use std::{
     sync::atomic::{AtomicU32, Ordering},
@@ -33,12 +41,15 @@ impl Offload {
         Self { score: AtomicU32::new(0), patience: PATIENCE }
     }
 
-    /// Runs `work`.
-    pub(crate) async fn run<T, F>(&self, work: F) -> T
+    /// Runs `work`, which asks about a file of a disk of this machine, or of who knows where.
+    pub(crate) async fn run<T, F>(&self, is_local: bool, work: F) -> T
     where
         T: Send + 'static,
         F: FnOnce() -> T + Send + 'static,
     {
+        if !is_local {
+            return on_pool(work).await;
+        }
         let timed = || {
             let start = Instant::now();
             let result = work();
@@ -47,9 +58,7 @@ impl Offload {
         let (result, duration) = if self.score.load(Ordering::Relaxed) < POOL_SCORE {
             timed()
         } else {
-            // The task is never cancelled: it can only fail by a panic of `work`.
-            let outcome = tokio::task::spawn_blocking(timed).await;
-            outcome.unwrap_or_else(|e| std::panic::resume_unwind(e.into_panic()))
+            on_pool(timed).await
         };
         self.note(duration > self.patience);
         result
@@ -69,13 +78,19 @@ impl Offload {
     }
 }
 
+async fn on_pool<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+    // The task is never cancelled: it can only fail by a panic of `work`.
+    let outcome = tokio::task::spawn_blocking(work).await;
+    outcome.unwrap_or_else(|e| std::panic::resume_unwind(e.into_panic()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::thread;
+    use std::{sync::mpsc, thread};
 
     async fn is_in_place(offload: &Offload) -> bool {
-        offload.run(|| thread::current().id()).await == thread::current().id()
+        offload.run(true, || thread::current().id()).await == thread::current().id()
     }
 
     #[tokio::test]
@@ -94,5 +109,18 @@ mod tests {
         assert!(!is_in_place(&offload).await);
         offload.patience = Duration::MAX;
         while !is_in_place(&offload).await {}
+    }
+
+    #[tokio::test]
+    async fn a_mount_that_hangs_keeps_nobody_else_waiting() {
+        let offload = Offload::new();
+        let (answer, answered) = mpsc::channel();
+        // Far beyond what this test takes: it fails rather than hangs where it is wrong.
+        let hung = offload.run(false, move || answered.recv_timeout(Duration::from_secs(10)));
+        let others = async {
+            assert!(is_in_place(&offload).await, "local files are none the worse for it");
+            answer.send(()).expect("somebody waits");
+        };
+        assert_eq!(tokio::join!(hung, others).0, Ok(()));
     }
 }

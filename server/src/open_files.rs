@@ -21,7 +21,8 @@ const MAX_OPEN: usize = 256;
 /// How often it is looked at where the names of open files lead.
 pub(crate) const SWEEP_INTERVAL: Duration = Duration::from_secs(10);
 
-type Entry = (Identity, Arc<DatasetFile>);
+/// An open file, and what its path led to when it was opened.
+pub(crate) type Entry = (Identity, Arc<DatasetFile>);
 
 /// Open files by path.
 #[derive(Debug, Default)]
@@ -30,16 +31,22 @@ pub(crate) struct OpenFiles {
 }
 
 impl OpenFiles {
-    /// The file that the path leads to now (blocking).
-    pub(crate) fn open(&self, path: PathBuf) -> Result<Arc<DatasetFile>, OpenError> {
+    /// The file that the path led to when it was last asked for.
+    pub(crate) fn known(&self, path: &Path) -> Option<Entry> {
+        self.files.read().unwrap_or_else(PoisonError::into_inner).get(path).cloned()
+    }
+
+    /// The file that the path leads to now, which may be the known one (blocking).
+    pub(crate) fn open(
+        &self,
+        path: PathBuf,
+        known: Option<Entry>,
+    ) -> Result<Arc<DatasetFile>, OpenError> {
         let identity = identity_of(&path);
+        if let (Some((known, file)), Ok(now)) = (known, &identity)
+            && known == *now
         {
-            let files = self.files.read().unwrap_or_else(PoisonError::into_inner);
-            if let (Some((known, file)), Ok(now)) = (files.get(&path), &identity)
-                && known == now
-            {
-                return Ok(Arc::clone(file));
-            }
+            return Ok(file);
         }
         let opened = identity.and_then(|_| DatasetFile::open(path.clone()));
         let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
@@ -111,7 +118,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("a.lods");
         let open_files = OpenFiles::default();
-        let open = || open_files.open(path.clone());
+        let open = || open_files.open(path.clone(), open_files.known(&path));
         assert_eq!(open().err(), Some(OpenError::Missing));
 
         std::fs::write(&path, dataset()).expect("writable");
@@ -137,7 +144,7 @@ mod tests {
         let path = folder.path().join("a.lods");
         std::fs::write(&path, dataset()).expect("writable");
         let open_files = OpenFiles::default();
-        let file = Arc::downgrade(&open_files.open(path.clone()).expect("a dataset"));
+        let file = Arc::downgrade(&open_files.open(path.clone(), None).expect("a dataset"));
         open_files.sweep();
         assert!(file.upgrade().is_some());
         std::fs::remove_file(&path).expect("it is there");

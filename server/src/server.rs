@@ -189,3 +189,132 @@ async fn recover(error: &io::Error) {
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Barrier;
+
+    use axum::{
+        Router,
+        routing::{MethodRouter, get},
+    };
+    use tokio::{
+        io::{AsyncReadExt, AsyncWriteExt},
+        sync::{Notify, oneshot},
+        task::{JoinHandle, spawn_blocking},
+        time::timeout,
+    };
+
+    use super::*;
+
+    /// Far beyond what anything here takes: a test fails rather than hangs.
+    const GUARD: Duration = Duration::from_secs(20);
+
+    const REQUEST: &[u8] = b"GET / HTTP/1.1\r\nhost: x\r\n\r\n";
+
+    struct Running {
+        site: Arc<Site>,
+        addr: SocketAddr,
+        stop: oneshot::Sender<()>,
+        running: JoinHandle<()>,
+    }
+
+    impl Running {
+        /// A server that has this in place of all its routes.
+        async fn start(handler: MethodRouter) -> Self {
+            let folder = tempfile::tempdir().expect("temporary");
+            let mut config = ServeConfig::new(folder.path(), SocketAddr::from(([127, 0, 0, 1], 0)));
+            config.drain_timeout = Duration::from_millis(50);
+            let mut server = Server::bind(config).await.expect("port 0 is free");
+            let host = Arc::get_mut(&mut server.host).expect("nobody else has it yet");
+            host.router = Router::new().route("/", handler);
+            let (site, addr) = (Arc::clone(&host.site), server.addr);
+            let (stop, stopped) = oneshot::channel();
+            let running = tokio::spawn(server.run(async { stopped.await.unwrap_or_default() }));
+            Self { site, addr, stop, running }
+        }
+
+        async fn connect(&self) -> TcpStream {
+            TcpStream::connect(self.addr).await.expect("the server accepts")
+        }
+
+        async fn ask(&self) -> TcpStream {
+            let mut stream = self.connect().await;
+            stream.write_all(REQUEST).await.expect("the server reads");
+            stream
+        }
+
+        async fn stop(self) -> bool {
+            drop(self.stop);
+            timeout(GUARD, self.running).await.is_ok_and(|ended| ended.is_ok())
+        }
+    }
+
+    /// A call that comes back only when it is let.
+    #[derive(Clone)]
+    struct Stuck {
+        begun: Arc<Notify>,
+        end: Arc<Barrier>,
+    }
+
+    impl Stuck {
+        fn new() -> Self {
+            Self { begun: Arc::default(), end: Arc::new(Barrier::new(2)) }
+        }
+
+        fn call(&self) {
+            self.begun.notify_one();
+            self.end.wait();
+        }
+    }
+
+    #[tokio::test]
+    async fn it_ends_though_a_call_on_the_pool_does_not() {
+        let stuck = Stuck::new();
+        let called = stuck.clone();
+        let handler = get(async move || _ = spawn_blocking(move || called.call()).await);
+        let server = Running::start(handler).await;
+        let _client = server.ask().await;
+        stuck.begun.notified().await;
+        assert!(server.stop().await);
+        stuck.end.wait();
+    }
+
+    #[tokio::test]
+    async fn it_ends_though_a_thread_of_connections_is_stuck_in_a_call() {
+        let stuck = Stuck::new();
+        let called = stuck.clone();
+        let server = Running::start(get(async move || called.call())).await;
+        let _client = server.ask().await;
+        stuck.begun.notified().await;
+        assert!(server.stop().await);
+        stuck.end.wait();
+    }
+
+    #[tokio::test]
+    async fn a_handler_that_panics_ends_its_connection_and_no_other() {
+        async fn panics() {
+            panic!("as a test");
+        }
+        let server = Running::start(get(panics)).await;
+        let connections = &server.site.metrics.connections;
+        let mut other = server.connect().await;
+        // Taken before the one that panics, by whichever thread.
+        while connections.get() < 1 {
+            tokio::task::yield_now().await;
+        }
+        let mut answer = Vec::new();
+        let ended = server.ask().await.read_to_end(&mut answer).await;
+        assert!(ended.is_err() || answer.is_empty(), "{answer:?}");
+        // It counts no longer once it has ended.
+        let ended = async {
+            while connections.get() > 1 {
+                tokio::task::yield_now().await;
+            }
+        };
+        timeout(GUARD, ended).await.expect("it still counts");
+        other.write_all(b"HEAD /none HTTP/1.1\r\nhost: x\r\n\r\n").await.expect("it stands");
+        other.read_exact(&mut [0; 12]).await.expect("an answer");
+        assert!(server.stop().await);
+    }
+}

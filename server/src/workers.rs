@@ -4,7 +4,7 @@
 //! ready from thread to thread, which costs more than it evens out, and where the system takes the processor from
 //! the thread that polls, all connections wait. Here a thread polls for its own connections alone, as nginx's
 //! processes do. Nothing may wait on these threads: reads that would are for the blocking pool, as are the short calls of the
-//! file system once several [were slow](crate::offload).
+//! file system unless it is of this machine's disks and [quick](crate::offload).
 
 use std::{io, num::NonZero, sync::Arc, thread};
 
@@ -66,7 +66,44 @@ impl Worker {
 
 #[cfg(test)]
 mod tests {
+    use std::{
+        cell::Cell,
+        sync::{
+            Barrier,
+            mpsc::{self, RecvTimeoutError},
+        },
+        time::Duration,
+    };
+
     use super::*;
+
+    thread_local! {
+        /// Dropped when the thread ends.
+        static AT_END: Cell<Option<mpsc::Sender<()>>> = const { Cell::new(None) };
+    }
+
+    #[test]
+    fn a_thread_ends_though_a_call_on_its_pool_does_not() {
+        let workers = Workers::start().expect("threads");
+        let (handle, _seat) = workers.least_busy();
+        let (tell, told) = mpsc::channel();
+        let (begin, begun) = mpsc::channel();
+        let end = Arc::new(Barrier::new(2));
+        let stuck = Arc::clone(&end);
+        handle.spawn(async move {
+            AT_END.set(Some(tell));
+            tokio::task::spawn_blocking(move || {
+                begin.send(()).expect("somebody listens");
+                stuck.wait();
+            });
+        });
+        begun.recv().expect("it runs");
+        drop(workers);
+        // Far beyond what it takes: the test fails rather than hangs.
+        let ended = told.recv_timeout(Duration::from_secs(20));
+        assert_eq!(ended, Err(RecvTimeoutError::Disconnected), "the thread is still there");
+        end.wait();
+    }
 
     #[test]
     fn connections_go_to_the_thread_that_has_fewest_and_leave_it_when_they_end() {
@@ -87,7 +124,7 @@ mod tests {
     fn what_is_spawned_runs_there_and_ends_with_the_workers() {
         let workers = Workers::start().expect("threads");
         let (handle, seat) = workers.least_busy();
-        let (tell, told) = std::sync::mpsc::channel();
+        let (tell, told) = mpsc::channel();
         handle.spawn(async move {
             let _seat = seat;
             tell.send(thread::current().name().map(str::to_owned)).expect("somebody listens");

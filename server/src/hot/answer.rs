@@ -5,12 +5,14 @@ use std::{io::Write, ops::Range, sync::Arc, time::SystemTime};
 use httpdate::HttpDate;
 use lodestream_protocol::{BATCH_TYPE, BatchRequest};
 
-use super::head::{Request, Wanted};
+use super::{
+    head::{Request, Wanted},
+    refused::Refused,
+};
 use crate::{
-    file::DatasetFile,
-    metrics::Kind,
+    file::{DatasetFile, OpenError},
     multipart::DATASET_TYPE,
-    routes::{BATCH_OFFER, CROSS_ORIGIN_FIELDS, Site, cache_control, reaches_beyond},
+    routes::{BATCH_OFFER, CROSS_ORIGIN_FIELDS, Site, cache_control, reaches_beyond, unanswered},
 };
 
 /// An answer that nothing stands against.
@@ -33,8 +35,22 @@ pub(super) enum Content {
 
 impl Answer {
     /// `None` where the long way has another answer.
-    pub(super) async fn to(site: &Arc<Site>, request: &Request<'_>, body: &[u8]) -> Option<Self> {
-        let file = site.dataset(request.file_name).await.ok()?;
+    ///
+    /// # Errors
+    /// Where a store has failed: asked again on the long way, it may take as long once more.
+    pub(super) async fn to(
+        site: &Arc<Site>,
+        request: &Request<'_>,
+        body: &[u8],
+    ) -> Result<Option<Self>, Refused> {
+        match site.dataset(request.file_name).await {
+            Ok(file) => Ok(Self::from(file, request, body)),
+            Err(OpenError::Unanswered) => Err(unanswered(request.file_name).into()),
+            Err(OpenError::Missing | OpenError::Unreadable(_)) => Ok(None),
+        }
+    }
+
+    fn from(file: Arc<DatasetFile>, request: &Request<'_>, body: &[u8]) -> Option<Self> {
         let tag = file.validators.etag.trim_matches('"');
         if request.version.is_some_and(|version| version != tag) {
             return None;
@@ -58,14 +74,6 @@ impl Answer {
         match self.content {
             Content::Range(_) => 206,
             Content::Batch(_) => 200,
-        }
-    }
-
-    /// For the figures.
-    pub(super) fn kind(&self) -> Kind {
-        match self.content {
-            Content::Range(_) => Kind::File,
-            Content::Batch(_) => Kind::Batch,
         }
     }
 

@@ -4,6 +4,8 @@ use std::ops::RangeInclusive;
 
 use lodestream_protocol::{BATCH_REQUEST_TYPE, MAX_BATCH_REQUEST_BYTES};
 
+use crate::metrics::Kind;
+
 /// A request with more fields than this goes the long way.
 const MAX_FIELDS: usize = 32;
 
@@ -57,6 +59,16 @@ pub(super) enum Wanted {
     Range(RangeInclusive<u64>),
     /// `POST` of a batch request of so many bytes.
     Batch(usize),
+}
+
+impl Wanted {
+    /// For the figures.
+    pub(super) const fn kind(&self) -> Kind {
+        match self {
+            Self::Range(_) => Kind::File,
+            Self::Batch(_) => Kind::Batch,
+        }
+    }
 }
 
 /// Looks at what a connection begins with.

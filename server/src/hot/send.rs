@@ -23,6 +23,21 @@ use crate::{
 /// connections, pages and copies: 47 and 56 thousand of 64 KiB, 33 and 29 of 128 KiB.)
 const SENDFILE_BYTES: u64 = 128 << 10;
 
+/// Why an answer was not sent whole.
+#[derive(Debug)]
+pub(super) enum Broken {
+    /// It went away, or takes nothing.
+    ByClient(io::Error),
+    /// Its file or store failed, which the body has told the log.
+    ByFile,
+}
+
+impl From<io::Error> for Broken {
+    fn from(error: io::Error) -> Self {
+        Self::ByClient(error)
+    }
+}
+
 /// Sends head and content.
 pub(super) async fn send(
     stream: &TcpStream,
@@ -30,7 +45,7 @@ pub(super) async fn send(
     answer: &Answer,
     head: &[u8],
     limits: ConnectionLimits,
-) -> io::Result<()> {
+) -> Result<(), Broken> {
     let socket = Socket { stream, limits };
     let (file, length) = (&answer.file, answer.len());
     if let Content::Range(range) = &answer.content
@@ -39,7 +54,7 @@ pub(super) async fn send(
         match file.private_copy.get() {
             None => private_copy::count(file, length, &site.private_copies),
             Some(copy) if copy.is_cached(range) => {
-                return socket.send_pages(copy, head, range.clone()).await;
+                return Ok(socket.send_pages(copy, head, range.clone()).await?);
             }
             Some(_) => {}
         }
@@ -52,6 +67,15 @@ pub(super) async fn send(
     socket.send_body(head, body).await
 }
 
+/// Sends what is there.
+pub(super) async fn send_bytes(
+    stream: &TcpStream,
+    bytes: &[u8],
+    limits: ConnectionLimits,
+) -> Result<(), Broken> {
+    Ok(Socket { stream, limits }.send_all(bytes).await?)
+}
+
 /// The client's end, and its patience.
 #[derive(Clone, Copy)]
 struct Socket<'a> {
@@ -61,9 +85,9 @@ struct Socket<'a> {
 
 impl Socket<'_> {
     /// Bytes that were read, together with the head.
-    async fn send_body(self, mut head: &[u8], mut body: FileBody) -> io::Result<()> {
+    async fn send_body(self, mut head: &[u8], mut body: FileBody) -> Result<(), Broken> {
         while let Some(piece) = body.next().await {
-            let piece = piece?;
+            let piece = piece.map_err(|_| Broken::ByFile)?;
             let mut piece = piece.as_ref();
             while !piece.is_empty() {
                 let sent = if head.is_empty() {
@@ -82,18 +106,23 @@ impl Socket<'_> {
         Ok(())
     }
 
+    async fn send_all(self, mut bytes: &[u8]) -> io::Result<()> {
+        while !bytes.is_empty() {
+            bytes = &bytes[self.wait(self.stream.try_write(bytes)).await?..];
+        }
+        Ok(())
+    }
+
     /// The head, then pages of a file that nobody else can change.
     async fn send_pages(
         self,
         copy: &PrivateCopy,
-        mut head: &[u8],
+        head: &[u8],
         mut range: Range<u64>,
     ) -> io::Result<()> {
         // In a packet of its own. Made to wait for the first pages, it takes a quarter of the speed away where the range does
         // not begin with one.
-        while !head.is_empty() {
-            head = &head[self.wait(self.stream.try_write(head)).await?..];
-        }
+        self.send_all(head).await?;
         while !range.is_empty() {
             let send = || copy.send_pages(self.stream, &range);
             let sent = self.wait(self.stream.try_io(Interest::WRITABLE, send)).await?;

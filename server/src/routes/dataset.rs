@@ -18,7 +18,7 @@ use super::{Refusal, Site, batch, missing};
 use crate::{
     body::FileBody,
     conditional::Verdict,
-    file::{DatasetFile, OpenError},
+    file::{DatasetFile, OpenError, UNANSWERED},
     multipart,
     range::Selection,
 };
@@ -79,6 +79,7 @@ pub(super) async fn open(
             let line = format!("{file_name} cannot be served: {reason}");
             return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, line));
         }
+        Err(OpenError::Unanswered) => return Err(unanswered(file_name)),
     };
     let version = query.and_then(|query| query.split('&').find_map(|p| p.strip_prefix("v=")));
     if version.is_some_and(|version| version != file.validators.etag.trim_matches('"')) {
@@ -86,6 +87,12 @@ pub(super) async fn open(
         return Err(Refusal::new(StatusCode::NOT_FOUND, line));
     }
     Ok(Opened { file, by_content: version.is_some() })
+}
+
+/// The object store fails; the log has it already.
+pub(crate) fn unanswered(file_name: &str) -> Refusal {
+    let line = format!("{file_name} cannot be served: {UNANSWERED}");
+    Refusal::new(StatusCode::SERVICE_UNAVAILABLE, line)
 }
 
 fn answer(site: &Site, opened: Opened, method: &Method, headers: &HeaderMap) -> Response {

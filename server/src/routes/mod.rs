@@ -52,7 +52,7 @@ use crate::{
 use self::compressed::compressed;
 
 pub(crate) use batch::{OFFER as BATCH_OFFER, reaches_beyond, segments as batch_segments};
-pub(crate) use dataset::cache_control;
+pub(crate) use dataset::{cache_control, unanswered};
 
 /// What all requests share.
 #[derive(Debug)]
@@ -208,7 +208,7 @@ fn missing(file_name: &str) -> Refusal {
 
 /// A response that is one line of text.
 #[derive(Debug)]
-struct Refusal {
+pub(crate) struct Refusal {
     status: StatusCode,
     line: String,
 }
@@ -217,16 +217,21 @@ impl Refusal {
     fn new(status: StatusCode, line: impl Into<String>) -> Self {
         Self { status, line: line.into() }
     }
-}
 
-impl IntoResponse for Refusal {
-    fn into_response(self) -> Response {
+    /// Status, fields and body.
+    pub(crate) fn into_parts(self) -> (StatusCode, [(HeaderName, &'static str); 3], String) {
         let fields = [
             (header::CONTENT_TYPE, "text/plain; charset=utf-8"),
             (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
             // What is not there may be a moment later.
             (header::CACHE_CONTROL, "no-store"),
         ];
-        (self.status, fields, format!("{}\n", self.line)).into_response()
+        (self.status, fields, format!("{}\n", self.line))
+    }
+}
+
+impl IntoResponse for Refusal {
+    fn into_response(self) -> Response {
+        self.into_parts().into_response()
     }
 }

@@ -10,6 +10,7 @@ use axum::{
 use lodestream_preprocess::preview::preview_content_id;
 
 use super::{Refusal, Site, dataset};
+use crate::file::OpenError;
 
 /// `GET` of a preview: only one that shows the very content that the dataset has now.
 pub(super) async fn preview(
@@ -19,7 +20,11 @@ pub(super) async fn preview(
 ) -> Result<impl IntoResponse, Refusal> {
     let opened = dataset::open(&site, &file_name, query.as_deref()).await?;
     let content_id = opened.file.validators.etag.trim_matches('"').to_owned();
-    let picture = site.storage.preview(&file_name).await.ok();
+    let picture = match site.storage.preview(&file_name).await {
+        // Whether there is one, nobody knows.
+        Err(OpenError::Unanswered) => return Err(dataset::unanswered(&file_name)),
+        picture => picture.ok(),
+    };
     let picture = picture.filter(|picture| preview_content_id(&picture.bytes) == Some(content_id));
     let Some(picture) = picture else {
         let line = "there is no picture of this dataset; `lodestream-server preview` makes one";

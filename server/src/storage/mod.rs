@@ -135,10 +135,11 @@ impl Storage {
         listing.await.map_err(io::Error::other).flatten()
     }
 
-    /// Makes ready for looking at all of these, one by one.
-    pub(crate) async fn warm(&self, file_names: &[String]) {
-        if let Self::Objects(objects) = self {
-            objects.warm(file_names).await;
+    /// Makes ready for looking at all of these, one by one; returns those that are not to be had.
+    pub(crate) async fn warm(&self, file_names: &[String]) -> HashSet<String> {
+        match self {
+            Self::Folder(..) => HashSet::new(),
+            Self::Objects(objects) => objects.warm(file_names).await,
         }
     }
 
@@ -195,8 +196,9 @@ impl Storage {
         match self {
             Self::Folder(folder, open_files) => {
                 let path = folder.path_of(file_name).ok_or(OpenError::Missing)?;
-                let open_files = Arc::clone(open_files);
-                offload.run(move || open_files.open(path)).await
+                let (open_files, known) = (Arc::clone(open_files), open_files.known(&path));
+                let is_local = known.as_ref().is_some_and(|(_, file)| file.is_local);
+                offload.run(is_local, move || open_files.open(path, known)).await
             }
             Self::Objects(objects) => {
                 let object = objects.dataset(file_name).await?;

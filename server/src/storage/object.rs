@@ -126,9 +126,12 @@ impl ReadAt for Object {
             return Err(FormatError::Truncated { what: "object", needed, available: size });
         }
         let mut bytes = vec![0; len];
-        Handle::current()
-            .block_on(self.read_into(&mut bytes, offset, 0))
-            .map_err(|e| FormatError::Read { offset, len: len as u64, message: e.to_string() })?;
+        Handle::current().block_on(self.read_into(&mut bytes, offset, 0)).map_err(|e| {
+            // The error goes to clients, in the list; what the store says is not for them.
+            tracing::warn!("{:?}: {e}", self.name());
+            let message = "the object store does not give them".to_owned();
+            FormatError::Read { offset, len: len as u64, message }
+        })?;
         Ok(bytes)
     }
 

@@ -6,6 +6,7 @@
 //! of two datasets never come together, and a read of one that was replaced fails.
 
 use std::{
+    collections::HashSet,
     future::Future,
     io,
     sync::{
@@ -51,6 +52,14 @@ struct Known {
     at: Instant,
     /// `None`: there is no such object.
     state: std::result::Result<Arc<ObjectState>, OpenError>,
+}
+
+impl Known {
+    /// Whether it is believed. What went wrong for now is so by those alone who waited for it.
+    fn is_fresh(&self) -> bool {
+        let is_settled = matches!(self.state, Ok(_) | Err(OpenError::Missing));
+        is_settled && self.at.elapsed() < FRESH
+    }
 }
 
 /// The datasets below a prefix of a bucket.
@@ -111,19 +120,26 @@ impl Objects {
     }
 
     /// Reads the first bytes of many datasets at a time, so that looking at them one by one, which
-    /// comes next, finds them in memory.
-    pub(crate) async fn warm(self: &Arc<Self>, file_names: &[String]) {
+    /// comes next, finds them in memory. Returns those that the store does not answer for: they are
+    /// not worth to be waited for again, one by one.
+    pub(crate) async fn warm(self: &Arc<Self>, file_names: &[String]) -> HashSet<String> {
         const AT_A_TIME: usize = 16;
+        let mut unanswered = HashSet::new();
         let mut tasks = JoinSet::new();
-        for file_name in file_names {
-            if tasks.len() >= AT_A_TIME {
-                tasks.join_next().await;
+        let mut left = file_names.iter();
+        loop {
+            for file_name in left.by_ref().take(AT_A_TIME - tasks.len()) {
+                let (objects, file_name) = (Arc::clone(self), file_name.clone());
+                tasks.spawn(async move {
+                    let opened = objects.dataset(&file_name).await;
+                    (opened.err() == Some(OpenError::Unanswered)).then_some(file_name)
+                });
             }
-            let (objects, file_name) = (Arc::clone(self), file_name.clone());
-            // What fails here fails again when it is looked at, and is told then.
-            tasks.spawn(async move { objects.dataset(&file_name).await.is_ok() });
+            match tasks.join_next().await {
+                Some(outcome) => unanswered.extend(outcome.unwrap_or_default()),
+                None => return unanswered,
+            }
         }
-        while tasks.join_next().await.is_some() {}
     }
 
     /// The dataset of that file name.
@@ -131,7 +147,7 @@ impl Objects {
         self: &Arc<Self>,
         file_name: &str,
     ) -> std::result::Result<Object, OpenError> {
-        self.known.remove_if(file_name, |known| known.at.elapsed() >= FRESH);
+        self.known.remove_if(file_name, |known| !known.is_fresh());
         let known = match self.known.get_value_or_guard_async(file_name).await {
             Ok(known) => known,
             Err(guard) => {
@@ -140,13 +156,13 @@ impl Objects {
                 match &known.state {
                     Ok(state) => self.last.insert(file_name.to_owned(), Arc::clone(state)),
                     Err(OpenError::Missing) => _ = self.last.remove(file_name),
-                    // What went wrong for now is not remembered. What was there before is: its blocks are
-                    // still good where the object turns out to be the same.
-                    Err(OpenError::Unreadable(_)) => {}
+                    // What was there before is remembered: its blocks are still good where the object
+                    // turns out to be the same.
+                    Err(OpenError::Unreadable(_) | OpenError::Unanswered) => {}
                 }
-                if !matches!(known.state, Err(OpenError::Unreadable(_))) {
-                    let _ = guard.insert(known.clone());
-                }
+                // Whoever waits for it is told the same: asked again for each of them, a store that
+                // fails after a while keeps the last as long as all of them together.
+                let _ = guard.insert(known.clone());
                 known
             }
         };
@@ -171,7 +187,10 @@ impl Objects {
                 return former.ok_or(OpenError::Missing);
             }
             Err(Failure::Store(StoreError::NotFound { .. })) => return Err(OpenError::Missing),
-            Err(e) => return Err(unanswered(file_name, &e)),
+            Err(e) => {
+                tell(file_name, &e);
+                return Err(OpenError::Unanswered);
+            }
         };
         let same =
             former.filter(|former| Identity::of_object(&former.meta) == Identity::of_object(&meta));
@@ -201,7 +220,10 @@ impl Objects {
         match self.get(&location, GetOptions { range, ..GetOptions::default() }).await {
             Ok((meta, bytes)) if meta.size == bytes.len() as u64 => Ok(SmallFile { bytes }),
             Ok(_) | Err(Failure::Store(StoreError::NotFound { .. })) => Err(OpenError::Missing),
-            Err(e) => Err(unanswered(name, &e)),
+            Err(e) => {
+                tell(name, &e);
+                Err(OpenError::Unanswered)
+            }
         }
     }
 
@@ -291,8 +313,52 @@ fn told(error: &StoreError) -> String {
     error.to_string().lines().map(str::trim).collect::<Vec<_>>().join(" ")
 }
 
-/// What the store says is for the log: it has addresses and more that clients need not know.
-fn unanswered(name: &str, failure: &Failure) -> OpenError {
+/// Tells the log, once for all who wait for the answer: none of them does.
+fn tell(name: &str, failure: &Failure) {
     tracing::warn!("{name:?}: {failure}");
-    OpenError::Unreadable("the object store does not answer as it should".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        io::{BufRead, BufReader, Write},
+        net::TcpListener,
+        sync::atomic::AtomicUsize,
+        thread,
+    };
+
+    use super::*;
+
+    #[tokio::test]
+    async fn all_who_wait_for_an_answer_are_told_of_a_failure_and_the_next_one_asks_again() {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("port 0 is free");
+        let url = format!("http://{}/", listener.local_addr().expect("bound"));
+        let asked = Arc::new(AtomicUsize::new(0));
+        let count = Arc::clone(&asked);
+        thread::spawn(move || {
+            for stream in listener.incoming() {
+                let mut stream = stream.expect("accepted");
+                let lines = BufReader::new(stream.try_clone().expect("a socket")).lines();
+                // Its last line is empty.
+                lines.map_while(io::Result::ok).take_while(|line| !line.is_empty()).for_each(drop);
+                count.fetch_add(1, Ordering::Relaxed);
+                let answer =
+                    b"HTTP/1.1 403 Forbidden\r\ncontent-length: 0\r\nconnection: close\r\n\r\n";
+                stream.write_all(answer).expect("it is read");
+            }
+        });
+        let options = vec![("allow_http".to_owned(), "true".to_owned())];
+        let place = ObjectPlace { url, options };
+        let objects = Objects::open(&place, 0, StorageMetrics::default()).expect("an address");
+        let objects = Arc::new(objects);
+        let open = async || objects.dataset("a.lods").await.map(|_| ());
+        let told = Err(OpenError::Unanswered);
+        assert_eq!(
+            tokio::join!(open(), open(), open()),
+            (told.clone(), told.clone(), told.clone())
+        );
+        assert_eq!(asked.load(Ordering::Relaxed), 1);
+        assert_eq!(open().await, told);
+        assert_eq!(asked.load(Ordering::Relaxed), 2);
+    }
 }

@@ -1,6 +1,11 @@
 //! A served folder.
 
-use std::{fs, net::SocketAddr, path::PathBuf};
+use std::{
+    fs,
+    io::{Read, Write},
+    net::{SocketAddr, TcpStream},
+    path::PathBuf,
+};
 
 use lodestream_server::{RunningServer, ServeConfig, spawn};
 use reqwest::{Method as HttpMethod, Response, header::HeaderMap};
@@ -76,4 +81,29 @@ impl Site {
 /// A field's value; nothing where it is absent.
 pub fn field<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
     headers.get(name).map_or("", |value| value.to_str().expect("text"))
+}
+
+/// Head and body of the answer to a `GET`, on a connection that stays open.
+pub fn ask(stream: &mut TcpStream, path: &str, fields: &str) -> (Vec<String>, Vec<u8>) {
+    let request = format!("GET {path} HTTP/1.1\r\nhost: x\r\n{fields}\r\n");
+    stream.write_all(request.as_bytes()).expect("the server reads");
+    answer(stream)
+}
+
+/// The head's lines, sorted, without the date.
+pub fn answer(stream: &mut TcpStream) -> (Vec<String>, Vec<u8>) {
+    let mut head = Vec::new();
+    while !head.ends_with(b"\r\n\r\n") {
+        let mut byte = [0];
+        stream.read_exact(&mut byte).expect("the server answers");
+        head.push(byte[0]);
+    }
+    let head = String::from_utf8(head).expect("ASCII");
+    let length = head.lines().find_map(|line| line.strip_prefix("content-length: "));
+    let mut body = vec![0; length.expect("a length").parse().expect("a number")];
+    stream.read_exact(&mut body).expect("the server answers");
+    let lines = head.lines().filter(|line| !line.starts_with("date: "));
+    let mut lines: Vec<_> = lines.map(|line| line.trim_end().to_owned()).collect();
+    lines.sort();
+    (lines, body)
 }

@@ -1,38 +1,10 @@
 //! Plain range requests go a short way of their own: nobody must be able to tell.
 
-use std::{
-    io::{Read, Write},
-    net::TcpStream,
-};
+use std::{io::Write, net::TcpStream};
 
 use lodestream_protocol::{BATCH_REQUEST_TYPE, BatchPart, BatchRequest, Header};
 
-use crate::support::{Site, dataset};
-
-/// Head and body of the answer to a `GET`, on a connection that stays open.
-fn ask(stream: &mut TcpStream, path: &str, fields: &str) -> (Vec<String>, Vec<u8>) {
-    let request = format!("GET {path} HTTP/1.1\r\nhost: x\r\n{fields}\r\n");
-    stream.write_all(request.as_bytes()).expect("the server reads");
-    answer(stream)
-}
-
-/// The head's lines, sorted, without the date.
-fn answer(stream: &mut TcpStream) -> (Vec<String>, Vec<u8>) {
-    let mut head = Vec::new();
-    while !head.ends_with(b"\r\n\r\n") {
-        let mut byte = [0];
-        stream.read_exact(&mut byte).expect("the server answers");
-        head.push(byte[0]);
-    }
-    let head = String::from_utf8(head).expect("ASCII");
-    let length = head.lines().find_map(|line| line.strip_prefix("content-length: "));
-    let mut body = vec![0; length.expect("a length").parse().expect("a number")];
-    stream.read_exact(&mut body).expect("the server answers");
-    let lines = head.lines().filter(|line| !line.starts_with("date: "));
-    let mut lines: Vec<_> = lines.map(|line| line.trim_end().to_owned()).collect();
-    lines.sort();
-    (lines, body)
-}
+use crate::support::{Site, answer, ask, dataset};
 
 #[tokio::test]
 async fn both_ways_give_the_same_answer() {
