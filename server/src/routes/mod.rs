@@ -28,6 +28,7 @@ use axum::{
     routing::get,
 };
 use tower_http::{
+    catch_panic::CatchPanicLayer,
     cors::{Any, CorsLayer},
     limit::RequestBodyLimitLayer,
     timeout::TimeoutLayer,
@@ -147,7 +148,7 @@ pub(crate) fn router(site: Arc<Site>, config: &ServeConfig) -> Router {
         .route("/{file}", get(dataset::dataset))
         .route("/{file}/batch", batch::route())
         .route_layer(middleware::from_fn_with_state(Arc::clone(&site), guard::may_read));
-    Router::new()
+    let routes = Router::new()
         .route("/", compressed(get(page::page)))
         .route("/datasets", compressed(get(list::list)))
         .route("/openapi.json", compressed(get(openapi::document)))
@@ -156,10 +157,17 @@ pub(crate) fn router(site: Arc<Site>, config: &ServeConfig) -> Router {
         .route("/metrics", get(figures::figures))
         .merge(of_datasets)
         .fallback(async || Refusal::new(StatusCode::NOT_FOUND, "nothing here; see /datasets"))
-        .with_state(Arc::clone(&site))
+        .with_state(Arc::clone(&site));
+    layered(routes, site, config)
+}
+
+/// What every request goes through, from the last to the first.
+fn layered(routes: Router, site: Arc<Site>, config: &ServeConfig) -> Router {
+    routes
         .layer(RequestBodyLimitLayer::new(config.max_body_bytes))
         .layer(TimeoutLayer::with_status_code(StatusCode::GATEWAY_TIMEOUT, config.response_timeout))
         .layer(middleware::from_fn_with_state(Arc::clone(&site), guard::admit))
+        .layer(CatchPanicLayer::custom(on_panic))
         .layer(cross_origin())
         .layer(middleware::from_fn(options::options))
         .layer(middleware::from_fn(options::host))
@@ -200,6 +208,12 @@ fn cross_origin() -> CorsLayer {
         .max_age(Duration::from_secs(24 * 60 * 60))
 }
 
+/// One request is lost, not the connection and the others on it. The system's hook has told the log.
+fn on_panic(_: Box<dyn std::any::Any + Send>) -> Response {
+    Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the server's fault; its log says more")
+        .into_response()
+}
+
 /// There is no such dataset; or not for whoever asks, which nobody can tell from this.
 fn missing(file_name: &str) -> Refusal {
     let line = format!("no dataset file {file_name:?} here; /datasets lists all");
@@ -233,5 +247,40 @@ impl Refusal {
 impl IntoResponse for Refusal {
     fn into_response(self) -> Response {
         self.into_parts().into_response()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::SocketAddr;
+
+    use axum::{body::to_bytes, extract::Request};
+    use hyper::service::Service;
+    use hyper_util::service::TowerToHyperService;
+
+    use super::*;
+    use crate::peer::Peer;
+
+    #[tokio::test]
+    async fn a_handler_that_panics_is_a_refusal_and_the_servers_fault() {
+        async fn panics() {
+            panic!("as a test");
+        }
+        let folder = tempfile::tempdir().expect("temporary");
+        let config = ServeConfig::new(folder.path(), SocketAddr::from(([127, 0, 0, 1], 0)));
+        let site = Site::open(&config).expect("a folder");
+        let router =
+            layered(Router::new().route("/healthz", get(panics)), Arc::clone(&site), &config);
+        let request = Request::get("/healthz").header(header::HOST, "x");
+        let peer = Peer { ip: [127, 0, 0, 1].into(), is_encrypted: false };
+        let request = request.extension(peer).body(axum::body::Body::empty()).expect("a request");
+        let answer = TowerToHyperService::new(router).call(request).await;
+        let answer = answer.unwrap_or_else(|never| match never {});
+        assert_eq!(answer.status(), StatusCode::INTERNAL_SERVER_ERROR);
+        assert_eq!(answer.headers()[header::ACCESS_CONTROL_ALLOW_ORIGIN], "*");
+        let body = to_bytes(answer.into_body(), 1000).await.expect("a body");
+        assert_eq!(body, "the server's fault; its log says more\n");
+        let figures = site.metrics.render();
+        assert!(figures.contains("status=\"500\"} 1"), "{figures}");
     }
 }
