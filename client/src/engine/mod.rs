@@ -38,6 +38,8 @@ mod stats;
 mod store;
 mod sync;
 mod tasked;
+#[cfg(test)]
+pub(crate) mod testing;
 mod traversal;
 mod tree;
 mod view;
