@@ -21,7 +21,7 @@ use super::{
     inbox::{Demand, TraversalMail},
     occlusion::{Drawn, DrawnNode, Occluders},
     piece::{NodeId, Part, Piece, PieceId},
-    plan::{DrawNode, FramePlan, WantedNode},
+    plan::{DrawNode, FramePlan, MissingPage, WantedNode},
     selection::{self, Limits, Pick, Selection},
     settings::Settings,
     shared::Shared,
@@ -135,6 +135,18 @@ impl Traversal {
                 is_there: groups & !self.store.groups(pick.id) == 0,
             }
         })
+    }
+
+    /// The parts of the indices that the newest plan lacks.
+    pub fn unknown(&self) -> impl Iterator<Item = MissingPage> {
+        let is_unopened = |(tree, cloud): &(&Option<Tree>, &Cloud)| tree.is_none() && !cloud.gone;
+        let unopened = self.trees.iter().zip(&self.clouds).filter(is_unopened);
+        let first = unopened.map(|(_, cloud)| MissingPage { cloud: cloud.number, below: None });
+        let further = self.missing_pages().into_iter().map(|page| {
+            let NodeId { cloud, key } = page.id.node;
+            MissingPage { cloud: self.clouds[cloud].number, below: Some(key) }
+        });
+        first.chain(further)
     }
 
     /// Runs until the inbox says to end.
