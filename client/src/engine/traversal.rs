@@ -490,3 +490,61 @@ impl Traversal {
         pieces.extend(found.filter(|piece| !self.store.is_lost(piece.id)));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use lodestream_protocol::{LatticeBox, Node, NodeKey};
+
+    use super::*;
+    use crate::{
+        camera::Camera,
+        engine::{
+            event::Content,
+            testing::{boot, manifest, node},
+        },
+        source::Source,
+    };
+
+    #[test]
+    fn a_version_that_comes_after_its_cloud_was_removed_is_none_and_the_others_are_replaced() {
+        let file = tempfile::NamedTempFile::new().expect("temporary file");
+        let source = Source::parse(file.path().to_str().expect("readable path")).expect("a file");
+        let config = EngineConfig::default();
+        let shared = Arc::new(Shared::new(&config, vec![source.clone(), source]));
+        let mut traversal = Traversal::new(Arc::clone(&shared), &config);
+        let step = |traversal: &mut Traversal| {
+            traversal.step(shared.traversal.try_take().expect("there is news"));
+            shared.board.read(|news| (Arc::clone(&news.plan), news.clouds.clone()))
+        };
+        let bounds = LatticeBox { min: [0; 3], max: [8; 3] };
+        let root = Node { bounds, ..node(NodeKey::ROOT) };
+        let version = |number| Arc::new(boot([number; 16], manifest(), vec![root.clone()]));
+        let camera = Camera::overview([0.0; 3].into(), [9.0; 3].into(), 1.0);
+        shared.traversal.set_view(View { camera, size_px: [100; 2] }, |_| {});
+        for cloud in [0, 1] {
+            shared.traversal.post(Event::Opened { cloud, boot: version(1) });
+        }
+        step(&mut traversal);
+        assert_eq!(traversal.wanted().count(), 2);
+
+        shared.remove(0);
+        step(&mut traversal);
+        // The loader did not know yet.
+        for (cloud, by) in [(0, 2), (1, 3)] {
+            shared.traversal.post(Event::Replaced { cloud, by, boot: version(2) });
+            let node = NodeId { cloud: by, key: NodeKey::ROOT };
+            let content = Content::Counted(1);
+            shared.traversal.post(Event::Group { node, group: 0, content });
+        }
+        let (plan, clouds) = step(&mut traversal);
+        assert!(clouds[0].removed && clouds[0].boot.is_none(), "{clouds:?}");
+        assert_eq!((clouds[0].replaced, clouds[1].replaced), (0, 1));
+        assert!(Arc::ptr_eq(
+            clouds[1].boot.as_ref().expect("open"),
+            traversal.trees[3].as_ref().expect("open").boot()
+        ));
+        let wanted: Vec<_> = traversal.wanted().map(|node| (node.cloud, node.is_there)).collect();
+        assert_eq!(wanted, [(1, true)]);
+        assert!(plan.settled && plan.nodes.iter().all(|node| node.cloud == 1), "{plan:?}");
+    }
+}
