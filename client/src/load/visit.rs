@@ -88,13 +88,15 @@ async fn work_until(
             _ = stopped.wait_for(|stopped| *stopped) => return Some(Ending::Stopped),
             () = sleep_until(due) => return None,
             plan = engine.next_plan() => {
-                log.note(engine, &plan);
+                log.note_nodes(engine);
                 let failure = engine.look_at_clouds(|clouds| {
                     clouds.iter().find_map(|cloud| cloud.failure.clone())
                 });
                 if let Some(why) = failure {
+                    // What its engine has settled on is no picture of the dataset.
                     return Some(Ending::Failed(why));
                 }
+                log.note_picture(engine, &plan);
             }
         }
     }
@@ -170,8 +172,8 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// A plan has come.
-    fn note(&mut self, engine: &TaskedEngine, plan: &FramePlan) {
+    /// A plan has come: what it wants.
+    fn note_nodes(&mut self, engine: &TaskedEngine) {
         let now = Instant::now();
         let due = self.unanswered.take().unwrap_or(self.due);
         let (wanted, mut waits): (Vec<_>, _) = (engine.wanted().collect(), Vec::new());
@@ -182,15 +184,15 @@ impl<'a> Log<'a> {
             let used = self.used.entry((node.cloud, node.key)).or_default();
             *used = node.bytes.max(*used);
         }
-        self.note_picture(engine, plan, now);
     }
 
-    fn note_picture(&mut self, engine: &TaskedEngine, plan: &FramePlan, now: Instant) {
+    /// A plan has come: what it shows.
+    fn note_picture(&mut self, engine: &TaskedEngine, plan: &FramePlan) {
         let Some(picture) = &mut self.picture else { return };
         if plan.view_generation < picture.generation || picture.settled.is_some() {
             return;
         }
-        let wait = now.saturating_duration_since(picture.due);
+        let wait = picture.due.elapsed();
         if plan.points > 0 {
             picture.first.get_or_insert(wait);
         }
