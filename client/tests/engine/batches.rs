@@ -1,21 +1,20 @@
 //! Requests for many parts: of our server, and of hosts that turn out not to take them.
 
-use std::{net::SocketAddr, sync::Arc, time::Duration};
+use std::{net::SocketAddr, sync::Arc};
 
 use lodestream_client::{
     engine::{Engine, EngineConfig, Totals},
-    source::{HttpSource, Meter, Source, Wire},
+    source::{HttpSource, Source, Wire},
 };
 use lodestream_protocol::BatchPart;
 use lodestream_server::{RunningServer, ServeConfig, spawn};
-use tokio::time::Instant;
 
 use crate::{
     common::{
         dataset::{Recipe, dataset},
         host::{Answer, Host},
     },
-    picture::{LONG, Picture, config, expected, http_source, overview, picture},
+    picture::{LONG, Picture, config, expected, http_source, meter, overview, picture},
 };
 
 /// A tag, and an offer that comes with it.
@@ -103,7 +102,7 @@ fn parts_come_back_to_back_whether_batches_are_offered_or_not() {
 #[tokio::test]
 async fn a_dataset_that_was_replaced_is_told_from_the_one_in_use_and_batches_go_on() {
     let (folder, _server, url) = serve(&dataset(Recipe::default()));
-    let meter = Arc::new(Meter::new(Instant::now(), Duration::from_secs(1), u64::MAX));
+    let meter = meter();
     let wire = Wire { link: None, meter: Some(Arc::clone(&meter)) };
     let source = Source::by_wire(&url, wire).expect("a URL");
     source.read_prefix(100).await.expect("a good host");

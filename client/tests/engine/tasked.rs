@@ -1,20 +1,20 @@
 //! Engines as tasks: the same nodes as an engine with threads of its own, and nothing left behind.
 
-use std::{collections::HashSet, iter::successors, sync::Arc, time::Duration};
+use std::{collections::HashSet, iter::successors, sync::Arc};
 
 use lodestream_client::{
     engine::{Commons, EngineConfig, FramePlan, MissingPage, Payloads, TaskedEngine, View},
     source::{HttpSource, Meter, Source, Timeouts, Wire},
 };
 use lodestream_protocol::Refinement;
-use tokio::{sync::mpsc::unbounded_channel, time::Instant};
+use tokio::sync::mpsc::unbounded_channel;
 
 use crate::{
     common::{
         dataset::{Recipe, dataset},
         host::{Answer, Host},
     },
-    picture::{LONG, Picture, config, expected, overview, picture},
+    picture::{LONG, Picture, config, expected, meter, overview, picture},
 };
 
 fn runtime() -> tokio::runtime::Runtime {
@@ -34,10 +34,6 @@ fn metered(host: &Host, meter: &Arc<Meter>) -> Source {
     let wire = Wire { link: None, meter: Some(Arc::clone(meter)) };
     let url = host.url().parse().expect("a URL");
     Source::Http(HttpSource::by_wire(url, timeouts, wire))
-}
-
-fn meter() -> Arc<Meter> {
-    Arc::new(Meter::new(Instant::now(), Duration::from_secs(1), u64::MAX))
 }
 
 async fn settle(engine: &mut TaskedEngine, view: View) -> Arc<FramePlan> {
