@@ -65,6 +65,9 @@ pub(super) struct Traversal {
     commons: Option<Arc<Commons>>,
     /// Whether everything that the newest plan wants is there.
     is_loaded: bool,
+    /// Numbers of clouds that can be read again. It is told together with the plan that knows of it: the one before may be
+    /// settled without them.
+    recovered: Vec<usize>,
     sequence: u64,
 }
 
@@ -111,6 +114,7 @@ impl Traversal {
             needed: Vec::new(),
             commons: None,
             is_loaded: false,
+            recovered: Vec::new(),
             sequence: 0,
         }
     }
@@ -256,14 +260,16 @@ impl Traversal {
                     reselect = true;
                 }
                 Event::CloudFailed { cloud, message } => {
+                    let number = self.clouds[cloud].number;
                     self.clouds[cloud].failed = true;
-                    self.post(self.clouds[cloud].number, |s| s.failure = Some(message.clone()));
+                    self.recovered.retain(|&recovered| recovered != number);
+                    self.post(number, |status| status.failure = Some(message.clone()));
                     self.shared.board.post(|news| news.add_problem(message));
                 }
                 Event::CloudIsBack { cloud } => {
                     self.clouds[cloud].failed = false;
                     self.store.find(cloud);
-                    self.post(self.clouds[cloud].number, |status| status.failure = None);
+                    self.recovered.push(self.clouds[cloud].number);
                 }
                 Event::Page { cloud, parent, page } => {
                     if let Some(tree) = &mut self.trees[cloud] {
@@ -313,10 +319,8 @@ impl Traversal {
         self.clouds[cloud].failed = false;
         self.update_groups(cloud);
         self.manifests.set(number, Some(&boot));
-        self.post(number, |status| {
-            status.boot = Some(boot);
-            status.failure = None;
-        });
+        self.recovered.push(number);
+        self.post(number, |status| status.boot = Some(boot));
     }
 
     /// Another version stands in the cloud's place, or none.
@@ -446,7 +450,13 @@ impl Traversal {
         self.sequence += 1;
         plan.sequence = self.sequence;
         self.shared.clock(|clock| clock.note(&plan));
-        self.shared.board.post(|news| news.plan = Arc::new(plan));
+        let recovered = std::mem::take(&mut self.recovered);
+        self.shared.board.post(|news| {
+            news.plan = Arc::new(plan);
+            for number in recovered {
+                news.cloud(number, |status| status.failure = None);
+            }
+        });
         self.shared.loader.set_demand(Demand { pieces, seen });
     }
 
@@ -493,7 +503,7 @@ impl Traversal {
 
 #[cfg(test)]
 mod tests {
-    use lodestream_protocol::{LatticeBox, Node, NodeKey};
+    use lodestream_protocol::{LatticeBox, Node, NodeKey, PayloadRef};
 
     use super::*;
     use crate::{
@@ -504,6 +514,47 @@ mod tests {
         },
         source::Source,
     };
+
+    #[test]
+    fn that_a_cloud_is_back_is_told_with_the_first_plan_that_knows_of_it() {
+        let file = tempfile::NamedTempFile::new().expect("temporary file");
+        let source = Source::parse(file.path().to_str().expect("readable path")).expect("a file");
+        let config = EngineConfig::default();
+        let shared = Arc::new(Shared::new(&config, vec![source]));
+        let mut traversal = Traversal::new(Arc::clone(&shared), &config);
+        let failure = || shared.board.read(|news| news.clouds[0].failure.clone());
+        let is_settled = || shared.board.read(|news| news.plan.settled);
+        let take = || shared.traversal.try_take().expect("there is news");
+        let camera = Camera::overview([0.0; 3].into(), [9.0; 3].into(), 1.0);
+        shared.traversal.set_view(View { camera, size_px: [100; 2] }, |_| {});
+        let bounds = LatticeBox { min: [0; 3], max: [8; 3] };
+        let payloads = vec![PayloadRef { offset: 0, bytes: 1, crc: 0 }];
+        let root = Node { bounds, payloads, ..node(NodeKey::ROOT) };
+        let boot = Arc::new(boot([1; 16], manifest(), vec![root]));
+        shared.traversal.post(Event::Opened { cloud: 0, boot: Arc::clone(&boot) });
+        traversal.step(take());
+        let fails = |cloud| Event::CloudFailed { cloud, message: "not found".into() };
+        let is_back = [Event::CloudIsBack { cloud: 0 }, Event::Replaced { cloud: 0, by: 1, boot }];
+        for event in is_back {
+            shared.traversal.post(fails(0));
+            traversal.step(take());
+            assert!(failure().is_some() && is_settled(), "nothing more is to come");
+            shared.traversal.post(event);
+            let mail = take();
+            traversal.read(mail);
+            assert!(failure().is_some(), "the newest plan is that of the failed cloud");
+            traversal.select();
+            traversal.publish(0);
+            assert!(failure().is_none() && !is_settled(), "the node can come again");
+        }
+        // Failed again before there was a plan.
+        shared.traversal.post(fails(1));
+        traversal.step(take());
+        shared.traversal.post(Event::CloudIsBack { cloud: 1 });
+        shared.traversal.post(fails(1));
+        traversal.step(take());
+        assert!(failure().is_some() && is_settled());
+    }
 
     #[test]
     fn a_version_that_comes_after_its_cloud_was_removed_is_none_and_the_others_are_replaced() {
