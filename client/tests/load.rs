@@ -15,7 +15,10 @@ use std::{
     time::Duration,
 };
 
-use lodestream_client::{engine::Policy, load::LoadReport};
+use lodestream_client::{
+    engine::Policy,
+    load::{LoadReport, WaitReport},
+};
 use lodestream_preprocess::{FileSource, with_foreign_payloads};
 use lodestream_protocol::{Dataset, Node, NodePoints};
 
@@ -306,6 +309,47 @@ fn a_host_that_dies_midway_gives_errors_by_kind_and_a_failure() {
     assert!(said.contains("no connection"), "{said}");
     assert!(read(folder.path(), "load.html").contains("What went wrong"));
     assert!(read(folder.path(), "errors.csv").contains("no connection"));
+}
+
+/// A host from which the load test learns where the dataset lies, and which then answers as told.
+fn opened(manners: impl Fn(usize) -> Answer + Send + 'static) -> Host {
+    let host = Host::good(dataset(recipe()));
+    let opening = opening(&host);
+    host.behave(move |request| match request.number.checked_sub(2 * opening) {
+        None => Answer::Good,
+        Some(number) => manners(number),
+    });
+    host
+}
+
+#[test]
+fn visits_that_fail_count_as_rounds_so_that_a_run_ends_though_its_host_is_dead() {
+    let host = opened(|_| Answer::Status(404));
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let bounded = ["--path", "orbit?seconds=2", "--loops", "3", "--most-requests", "20"];
+    // Were visits begun for ever, the requests would be spent.
+    load(&host.url(), folder.path(), &[&bounded[..], &["--clients", "2"]].concat());
+    let run = &report(folder.path()).runs[0];
+    assert_eq!((run.visits.begun, run.visits.complete, run.visits.failed), (6, 0, 6), "{run:?}");
+    assert_eq!((run.requests.sent, run.cut_short.as_deref()), (6, None), "{run:?}");
+    assert_eq!(run.errors_by_kind.get("status 404"), Some(&6));
+    let pictures = [&run.cold.first, &run.cold.settled].map(|w| (w.came, w.given_up));
+    assert_eq!(pictures, [(0, 6); 2], "a host that refuses is not a fast one");
+}
+
+#[test]
+fn a_client_that_keeps_its_cache_comes_back_after_a_failure_for_the_rounds_that_are_left() {
+    let host = opened(|number| if number == 0 { Answer::Status(404) } else { Answer::Good });
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = ["--path", "teleport?seconds=2&stops=2", "--loops", "3", "--keep-cache"];
+    load(&host.url(), folder.path(), &[&path[..], &["--clients", "1"]].concat());
+    let run = &report(folder.path()).runs[0];
+    assert_eq!((run.visits.begun, run.visits.complete, run.visits.failed), (2, 1, 1), "{run:?}");
+    // Two rounds of two views, of which the very first is no jump; and the visit that failed.
+    let pictures = |waits: &WaitReport| waits.came + waits.given_up;
+    let found = (pictures(&run.cold.settled), pictures(&run.jumps.settled));
+    assert_eq!(found, (2, 3), "{run:?}");
+    assert!(run.nodes.came > 0, "{run:?}");
 }
 
 #[test]

@@ -266,20 +266,12 @@ mod tests {
     use std::fs::{File, OpenOptions};
 
     use lodestream_preprocess::FileSource;
-    use lodestream_protocol::Header;
+
+    use crate::testing::header;
 
     /// A file of 64 KiB of ones behind a header.
     fn dataset(folder: &tempfile::TempDir) -> DatasetFile {
-        let header = Header {
-            version: (1, 0),
-            manifest_bytes: 0,
-            root_page_bytes: 0,
-            boot_bytes: 64,
-            file_bytes: 64 << 10,
-            content_id: [7; 16],
-            index_crc: 0,
-        };
-        let mut bytes = header.encode().to_vec();
+        let mut bytes = header(64 << 10).encode().to_vec();
         bytes.resize(64 << 10, 1);
         let path = folder.path().join("a.lods");
         std::fs::write(&path, bytes).expect("writable");

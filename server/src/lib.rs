@@ -47,6 +47,8 @@ mod routes;
 mod running;
 mod server;
 mod storage;
+#[cfg(test)]
+mod testing;
 mod tls;
 mod workers;
 

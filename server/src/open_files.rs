@@ -93,21 +93,11 @@ fn identity_of(path: &Path) -> Result<Identity, OpenError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::header;
     use lodestream_protocol::Boot;
 
     fn dataset() -> Vec<u8> {
-        let mut bytes = lodestream_protocol::Header {
-            version: (1, 0),
-            manifest_bytes: 0,
-            root_page_bytes: 0,
-            boot_bytes: 64,
-            file_bytes: 64,
-            content_id: [7; 16],
-            index_crc: 0,
-        }
-        .encode()
-        .to_vec();
-        // Not even its index is sound: that is for readers to see.
+        let mut bytes = header(64).encode().to_vec();
         assert!(Boot::parse(&bytes).is_err());
         bytes.extend_from_slice(b"more");
         bytes

@@ -109,56 +109,17 @@ pub(super) fn page_nodes(page: HierarchyPage) -> PageNodes {
 
 #[cfg(test)]
 mod tests {
-    use lodestream_protocol::{
-        Header, Lattice, LatticeBox, Manifest, Method, Primitive, Refinement,
-    };
+    use lodestream_protocol::Manifest;
 
     use super::*;
+    use crate::engine::testing;
 
     fn boot(points: u64) -> Boot {
-        let lattice = Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits: 8 };
-        let manifest = Manifest {
-            generator: "test".into(),
-            points,
-            nodes: 1,
-            levels: 1,
-            refinement: Refinement::Additive,
-            primitive: Primitive::Point,
-            method: Method { name: "random".into(), grid: 128, leaf_capacity: 1 },
-            lattice,
-            bounds: LatticeBox::EMPTY,
-            largest_rounding: 0.0,
-            attributes: vec![],
-            groups: vec![],
-            fine: None,
-            crs: None,
-            sources: vec![],
-        };
-        let header = Header {
-            version: (1, 0),
-            manifest_bytes: 0,
-            root_page_bytes: 0,
-            boot_bytes: 0,
-            file_bytes: 0,
-            content_id: [7; 16],
-            index_crc: 0,
-        };
-        Boot { header, manifest, root_page: HierarchyPage::default() }
+        testing::boot([7; 16], Manifest { points, ..testing::manifest() }, vec![])
     }
 
     fn page(points: u32) -> HierarchyPage {
-        let node = Node {
-            key: NodeKey::ROOT,
-            child_mask: 0,
-            points,
-            bounds: LatticeBox::EMPTY,
-            geometric_error: 0.0,
-            spacing: 0.0,
-            normal_cone: None,
-            payloads: vec![],
-            child_page: None,
-        };
-        HierarchyPage { nodes: vec![node] }
+        HierarchyPage { nodes: vec![Node { points, ..testing::node(NodeKey::ROOT) }] }
     }
 
     #[test]

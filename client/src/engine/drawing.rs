@@ -64,28 +64,17 @@ pub(super) fn draw(picks: &[Pick], presence: impl Fn(&Pick) -> Presence) -> Draw
 mod tests {
     use std::{ops::Range, sync::Arc};
 
-    use lodestream_protocol::{LatticeBox, Node, NodeKey};
+    use lodestream_protocol::NodeKey;
 
     use super::{
         Presence::{Absent, Drawable, Lost},
         *,
     };
-    use crate::engine::piece::NodeId;
+    use crate::engine::{piece::NodeId, testing::node};
 
     fn pick(refinement: Refinement, parent: Option<usize>, family: Option<Range<usize>>) -> Pick {
-        let node = Node {
-            key: NodeKey::ROOT,
-            child_mask: 0,
-            points: 1,
-            bounds: LatticeBox::EMPTY,
-            geometric_error: 0.0,
-            spacing: 0.0,
-            normal_cone: None,
-            payloads: vec![],
-            child_page: None,
-        };
+        let node = Arc::new(node(NodeKey::ROOT));
         let id = NodeId { cloud: 0, key: node.key };
-        let node = Arc::new(node);
         let (priority, urgency, reserved) = (1.0, 1.0, 1);
         let is_exact = false;
         Pick { id, node, refinement, parent, family, priority, urgency, reserved, is_exact }

@@ -38,6 +38,8 @@ mod stats;
 mod store;
 mod sync;
 mod tasked;
+#[cfg(test)]
+pub(crate) mod testing;
 mod traversal;
 mod tree;
 mod view;
@@ -53,7 +55,7 @@ pub use config::{Coalesce, EngineConfig, LoadOrder, Payloads};
 pub use depth::DepthPyramid;
 pub use error::EngineError;
 pub use occlusion::SplatReach;
-pub use plan::{DrawNode, FramePlan, LeftOut, Tally, WantedNode};
+pub use plan::{DrawNode, FramePlan, LeftOut, MissingPage, Tally, WantedNode};
 pub use policy::Policy;
 pub use priority::Priority;
 pub use simulated::SimulatedEngine;

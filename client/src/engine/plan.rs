@@ -38,6 +38,15 @@ pub struct WantedNode {
     pub is_there: bool,
 }
 
+/// A part of an index that a view needs and that is not loaded: what there is below is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct MissingPage {
+    /// Index of the cloud, in the order of the sources given to the engine.
+    pub cloud: usize,
+    /// The node that it begins below; `None` for the cloud's first, which tells of the root.
+    pub below: Option<NodeKey>,
+}
+
 /// Nodes and their points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Tally {

@@ -496,15 +496,13 @@ mod tests {
     use std::collections::HashMap;
 
     use glam::DVec3;
-    use lodestream_protocol::{
-        Boot, GroupInfo, Header, HierarchyPage, Manifest, Method, PageRef, PayloadRef, Primitive,
-    };
+    use lodestream_protocol::{Boot, HierarchyPage, Manifest, PageRef, PayloadRef};
     use proptest::prelude::*;
 
     use super::*;
     use crate::{
         camera::{Camera, Projection},
-        engine::view::View,
+        engine::{testing, view::View},
     };
 
     /// The cube is 256 world units wide.
@@ -530,17 +528,8 @@ mod tests {
                 let bounds = random_box(within, &mut rng);
                 let child_mask = if key.level() == 3 { 0 } else { rng.u8(..) };
                 let points = rng.u32(1..1000);
-                let mut node = Node {
-                    key,
-                    child_mask,
-                    points,
-                    bounds,
-                    geometric_error: 0.0,
-                    spacing: 0.0,
-                    normal_cone: None,
-                    payloads: vec![PayloadRef { offset: 0, bytes: 5 * points, crc: 0 }],
-                    child_page: None,
-                };
+                let payloads = vec![PayloadRef { offset: 0, bytes: 5 * points, crc: 0 }];
+                let mut node = Node { child_mask, points, bounds, payloads, ..testing::node(key) };
                 let below: Vec<_> = node
                     .children()
                     .filter_map(|child| Some((child, overlap(cube(child), bounds)?)))
@@ -562,18 +551,10 @@ mod tests {
                     }
                 }
             }
-            let manifest = manifest(refinement);
-            let header = Header {
-                version: (1, 0),
-                manifest_bytes: 0,
-                root_page_bytes: 0,
-                boot_bytes: 0,
-                file_bytes: 0,
-                content_id: [0; 16],
-                index_crc: 0,
-            };
-            let root_page = HierarchyPage { nodes: root_page };
-            Self { boot: Arc::new(Boot { header, manifest, root_page }), pages }
+            let manifest =
+                Manifest { refinement, lattice: LATTICE, bounds: whole, ..testing::manifest() };
+            let boot = testing::boot([0; 16], manifest, root_page);
+            Self { boot: Arc::new(boot), pages }
         }
 
         /// The tree with these pages.
@@ -606,26 +587,6 @@ mod tests {
             }
         }
         within
-    }
-
-    fn manifest(refinement: Refinement) -> Manifest {
-        Manifest {
-            generator: String::new(),
-            points: 1,
-            nodes: 1,
-            levels: 4,
-            refinement,
-            primitive: Primitive::Point,
-            method: Method { name: String::new(), grid: 128, leaf_capacity: 1 },
-            lattice: LATTICE,
-            bounds: LatticeBox { min: [0; 3], max: [255; 3] },
-            largest_rounding: 0.0,
-            attributes: vec![],
-            groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
-            fine: None,
-            crs: None,
-            sources: vec![],
-        }
     }
 
     fn optics(eye: [f64; 3], target: [f64; 3], fov_y: f64) -> Optics {

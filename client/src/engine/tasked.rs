@@ -9,8 +9,8 @@ use std::sync::Arc;
 use tokio::task::AbortHandle;
 
 use super::{
-    Commons, EngineStats, FramePlan, View, WantedNode, board::CloudStatus, config::EngineConfig,
-    loader::Loader, shared::Shared, traversal::Traversal,
+    Commons, EngineStats, FramePlan, MissingPage, View, WantedNode, board::CloudStatus,
+    config::EngineConfig, loader::Loader, shared::Shared, traversal::Traversal,
 };
 use crate::source::Source;
 
@@ -59,6 +59,12 @@ impl TaskedEngine {
     /// What the newest plan wants, and whether it is there.
     pub fn wanted(&self) -> impl Iterator<Item = WantedNode> {
         self.traversal.wanted()
+    }
+
+    /// The parts of the indices that the newest plan lacks. A node that a plan wants, though the one before did not and
+    /// was for the same view, lies below one of those that the one before lacked.
+    pub fn missing_pages(&self) -> impl Iterator<Item = MissingPage> {
+        self.traversal.unknown()
     }
 
     /// Looks at how the clouds are, in the order of the sources.

@@ -21,7 +21,7 @@ use super::{
     inbox::{Demand, TraversalMail},
     occlusion::{Drawn, DrawnNode, Occluders},
     piece::{NodeId, Part, Piece, PieceId},
-    plan::{DrawNode, FramePlan, WantedNode},
+    plan::{DrawNode, FramePlan, MissingPage, WantedNode},
     selection::{self, Limits, Pick, Selection},
     settings::Settings,
     shared::Shared,
@@ -65,6 +65,9 @@ pub(super) struct Traversal {
     commons: Option<Arc<Commons>>,
     /// Whether everything that the newest plan wants is there.
     is_loaded: bool,
+    /// Numbers of clouds that can be read again. It is told together with the plan that knows of it: the one before may be
+    /// settled without them.
+    recovered: Vec<usize>,
     sequence: u64,
 }
 
@@ -111,6 +114,7 @@ impl Traversal {
             needed: Vec::new(),
             commons: None,
             is_loaded: false,
+            recovered: Vec::new(),
             sequence: 0,
         }
     }
@@ -135,6 +139,18 @@ impl Traversal {
                 is_there: groups & !self.store.groups(pick.id) == 0,
             }
         })
+    }
+
+    /// The parts of the indices that the newest plan lacks.
+    pub fn unknown(&self) -> impl Iterator<Item = MissingPage> {
+        let is_unopened = |(tree, cloud): &(&Option<Tree>, &Cloud)| tree.is_none() && !cloud.gone;
+        let unopened = self.trees.iter().zip(&self.clouds).filter(is_unopened);
+        let first = unopened.map(|(_, cloud)| MissingPage { cloud: cloud.number, below: None });
+        let further = self.missing_pages().into_iter().map(|page| {
+            let NodeId { cloud, key } = page.id.node;
+            MissingPage { cloud: self.clouds[cloud].number, below: Some(key) }
+        });
+        first.chain(further)
     }
 
     /// Runs until the inbox says to end.
@@ -244,14 +260,16 @@ impl Traversal {
                     reselect = true;
                 }
                 Event::CloudFailed { cloud, message } => {
+                    let number = self.clouds[cloud].number;
                     self.clouds[cloud].failed = true;
-                    self.post(self.clouds[cloud].number, |s| s.failure = Some(message.clone()));
+                    self.recovered.retain(|&recovered| recovered != number);
+                    self.post(number, |status| status.failure = Some(message.clone()));
                     self.shared.board.post(|news| news.add_problem(message));
                 }
                 Event::CloudIsBack { cloud } => {
                     self.clouds[cloud].failed = false;
                     self.store.find(cloud);
-                    self.post(self.clouds[cloud].number, |status| status.failure = None);
+                    self.recovered.push(self.clouds[cloud].number);
                 }
                 Event::Page { cloud, parent, page } => {
                     if let Some(tree) = &mut self.trees[cloud] {
@@ -301,10 +319,8 @@ impl Traversal {
         self.clouds[cloud].failed = false;
         self.update_groups(cloud);
         self.manifests.set(number, Some(&boot));
-        self.post(number, |status| {
-            status.boot = Some(boot);
-            status.failure = None;
-        });
+        self.recovered.push(number);
+        self.post(number, |status| status.boot = Some(boot));
     }
 
     /// Another version stands in the cloud's place, or none.
@@ -434,7 +450,13 @@ impl Traversal {
         self.sequence += 1;
         plan.sequence = self.sequence;
         self.shared.clock(|clock| clock.note(&plan));
-        self.shared.board.post(|news| news.plan = Arc::new(plan));
+        let recovered = std::mem::take(&mut self.recovered);
+        self.shared.board.post(|news| {
+            news.plan = Arc::new(plan);
+            for number in recovered {
+                news.cloud(number, |status| status.failure = None);
+            }
+        });
         self.shared.loader.set_demand(Demand { pieces, seen });
     }
 
@@ -476,5 +498,104 @@ impl Traversal {
         let groups = (0..pick.node.payloads.len()).filter(|&g| missing & group_bit(g) != 0);
         let found = groups.filter_map(|g| Piece::group(pick.id.cloud, &pick.node, g));
         pieces.extend(found.filter(|piece| !self.store.is_lost(piece.id)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lodestream_protocol::{LatticeBox, Node, NodeKey, PayloadRef};
+
+    use super::*;
+    use crate::{
+        camera::Camera,
+        engine::{
+            event::Content,
+            testing::{boot, manifest, node},
+        },
+        source::Source,
+    };
+
+    #[test]
+    fn that_a_cloud_is_back_is_told_with_the_first_plan_that_knows_of_it() {
+        let file = tempfile::NamedTempFile::new().expect("temporary file");
+        let source = Source::parse(file.path().to_str().expect("readable path")).expect("a file");
+        let config = EngineConfig::default();
+        let shared = Arc::new(Shared::new(&config, vec![source]));
+        let mut traversal = Traversal::new(Arc::clone(&shared), &config);
+        let failure = || shared.board.read(|news| news.clouds[0].failure.clone());
+        let is_settled = || shared.board.read(|news| news.plan.settled);
+        let take = || shared.traversal.try_take().expect("there is news");
+        let camera = Camera::overview([0.0; 3].into(), [9.0; 3].into(), 1.0);
+        shared.traversal.set_view(View { camera, size_px: [100; 2] }, |_| {});
+        let bounds = LatticeBox { min: [0; 3], max: [8; 3] };
+        let payloads = vec![PayloadRef { offset: 0, bytes: 1, crc: 0 }];
+        let root = Node { bounds, payloads, ..node(NodeKey::ROOT) };
+        let boot = Arc::new(boot([1; 16], manifest(), vec![root]));
+        shared.traversal.post(Event::Opened { cloud: 0, boot: Arc::clone(&boot) });
+        traversal.step(take());
+        let fails = |cloud| Event::CloudFailed { cloud, message: "not found".into() };
+        let is_back = [Event::CloudIsBack { cloud: 0 }, Event::Replaced { cloud: 0, by: 1, boot }];
+        for event in is_back {
+            shared.traversal.post(fails(0));
+            traversal.step(take());
+            assert!(failure().is_some() && is_settled(), "nothing more is to come");
+            shared.traversal.post(event);
+            let mail = take();
+            traversal.read(mail);
+            assert!(failure().is_some(), "the newest plan is that of the failed cloud");
+            traversal.select();
+            traversal.publish(0);
+            assert!(failure().is_none() && !is_settled(), "the node can come again");
+        }
+        // Failed again before there was a plan.
+        shared.traversal.post(fails(1));
+        traversal.step(take());
+        shared.traversal.post(Event::CloudIsBack { cloud: 1 });
+        shared.traversal.post(fails(1));
+        traversal.step(take());
+        assert!(failure().is_some() && is_settled());
+    }
+
+    #[test]
+    fn a_version_that_comes_after_its_cloud_was_removed_is_none_and_the_others_are_replaced() {
+        let file = tempfile::NamedTempFile::new().expect("temporary file");
+        let source = Source::parse(file.path().to_str().expect("readable path")).expect("a file");
+        let config = EngineConfig::default();
+        let shared = Arc::new(Shared::new(&config, vec![source.clone(), source]));
+        let mut traversal = Traversal::new(Arc::clone(&shared), &config);
+        let step = |traversal: &mut Traversal| {
+            traversal.step(shared.traversal.try_take().expect("there is news"));
+            shared.board.read(|news| (Arc::clone(&news.plan), news.clouds.clone()))
+        };
+        let bounds = LatticeBox { min: [0; 3], max: [8; 3] };
+        let root = Node { bounds, ..node(NodeKey::ROOT) };
+        let version = |number| Arc::new(boot([number; 16], manifest(), vec![root.clone()]));
+        let camera = Camera::overview([0.0; 3].into(), [9.0; 3].into(), 1.0);
+        shared.traversal.set_view(View { camera, size_px: [100; 2] }, |_| {});
+        for cloud in [0, 1] {
+            shared.traversal.post(Event::Opened { cloud, boot: version(1) });
+        }
+        step(&mut traversal);
+        assert_eq!(traversal.wanted().count(), 2);
+
+        shared.remove(0);
+        step(&mut traversal);
+        // The loader did not know yet.
+        for (cloud, by) in [(0, 2), (1, 3)] {
+            shared.traversal.post(Event::Replaced { cloud, by, boot: version(2) });
+            let node = NodeId { cloud: by, key: NodeKey::ROOT };
+            let content = Content::Counted(1);
+            shared.traversal.post(Event::Group { node, group: 0, content });
+        }
+        let (plan, clouds) = step(&mut traversal);
+        assert!(clouds[0].removed && clouds[0].boot.is_none(), "{clouds:?}");
+        assert_eq!((clouds[0].replaced, clouds[1].replaced), (0, 1));
+        assert!(Arc::ptr_eq(
+            clouds[1].boot.as_ref().expect("open"),
+            traversal.trees[3].as_ref().expect("open").boot()
+        ));
+        let wanted: Vec<_> = traversal.wanted().map(|node| (node.cloud, node.is_there)).collect();
+        assert_eq!(wanted, [(1, true)]);
+        assert!(plan.settled && plan.nodes.iter().all(|node| node.cloud == 1), "{plan:?}");
     }
 }

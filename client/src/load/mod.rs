@@ -2,12 +2,13 @@
 //!
 //! - `config.rs`: what is asked for, within bounds;
 //! - `itinerary.rs`: the path as a timetable, which no server can hold up;
-//! - `visit.rs`: one client; `crowd.rs`: all of them on a few threads;
+//! - `visit.rs`: one client; `awaited.rs`: what it waits for; `crowd.rs`: all of them on a few threads;
 //! - `ledger.rs`: what they write down together; `waits.rs`: quantiles of what may never have come;
 //! - `process.rs`: what the server takes of its machine;
 //! - `knee.rs`, `ratio.rs`: what the runs come to side by side;
 //! - `report.rs`, `page.rs`, `summary.rs`: what was found, for programs, for people, and for a terminal.
 
+mod awaited;
 mod config;
 mod crowd;
 mod itinerary;

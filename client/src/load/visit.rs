@@ -1,6 +1,6 @@
 //! A visitor: a real engine that follows the timetable, and a record of what came of it when.
 
-use std::{collections::HashMap, time::Duration};
+use std::{collections::HashMap, mem::take, time::Duration};
 
 use lodestream_protocol::NodeKey;
 use tokio::{
@@ -9,10 +9,11 @@ use tokio::{
 };
 
 use super::{
+    awaited::Awaited,
     itinerary::{Itinerary, Stop},
-    ledger::{Arrival, Ledger, NodeWait},
+    ledger::{Arrival, Ledger},
 };
-use crate::engine::{FramePlan, TaskedEngine, WantedNode};
+use crate::engine::{FramePlan, TaskedEngine};
 
 /// How a visit ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -87,20 +88,19 @@ async fn work_until(
             _ = stopped.wait_for(|stopped| *stopped) => return Some(Ending::Stopped),
             () = sleep_until(due) => return None,
             plan = engine.next_plan() => {
-                log.note(engine, &plan);
+                log.note_nodes(engine);
                 let failure = engine.look_at_clouds(|clouds| {
                     clouds.iter().find_map(|cloud| cloud.failure.clone())
                 });
                 if let Some(why) = failure {
+                    // What its engine has settled on is no picture of the dataset.
                     return Some(Ending::Failed(why));
                 }
+                log.note_picture(engine, &plan);
             }
         }
     }
 }
-
-/// Identifies a node of a visit.
-type Id = (usize, NodeKey);
 
 /// What a visitor remembers.
 struct Log<'a> {
@@ -111,15 +111,9 @@ struct Log<'a> {
     due: Instant,
     /// When the oldest view was due that no plan has answered yet.
     unanswered: Option<Instant>,
-    /// When the oldest view was due that a part of the index is missing for: what that part will
-    /// tell of counts as wanted since then.
-    index_since: Option<Instant>,
-    /// Wanted nodes that are not there: since when, and the last plan that wanted them.
-    missing: HashMap<Id, (Instant, u64)>,
-    plans: u64,
-    /// Bytes of nodes that were drawn.
-    used: HashMap<Id, u64>,
-    waits: Vec<NodeWait>,
+    awaited: Awaited,
+    /// Bytes of nodes that were drawn, by cloud and node.
+    used: HashMap<(usize, NodeKey), u64>,
     picture: Option<Picture>,
 }
 
@@ -142,11 +136,8 @@ impl<'a> Log<'a> {
             generation: 0,
             due: begin,
             unanswered: None,
-            index_since: Some(begin),
-            missing: HashMap::new(),
-            plans: 0,
+            awaited: Awaited::default(),
             used: HashMap::new(),
-            waits: Vec::new(),
             picture: None,
         }
     }
@@ -181,47 +172,27 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// A plan has come.
-    fn note(&mut self, engine: &TaskedEngine, plan: &FramePlan) {
+    /// A plan has come: what it wants.
+    fn note_nodes(&mut self, engine: &TaskedEngine) {
         let now = Instant::now();
-        let since = [self.unanswered.take(), self.index_since].into_iter().flatten().min();
-        let since = since.unwrap_or(self.due);
-        self.plans += 1;
-        for node in engine.wanted() {
-            self.note_node(node, since, now);
+        let due = self.unanswered.take().unwrap_or(self.due);
+        let (wanted, mut waits): (Vec<_>, _) = (engine.wanted().collect(), Vec::new());
+        self.awaited.note(due, &wanted, engine.missing_pages(), now, &mut waits);
+        self.ledger.add_nodes(&waits);
+        for node in wanted.iter().filter(|node| node.is_there) {
+            // More where it is drawn more exactly than before.
+            let used = self.used.entry((node.cloud, node.key)).or_default();
+            *used = node.bytes.max(*used);
         }
-        let (ledger, waits, plans) = (self.ledger, &mut self.waits, self.plans);
-        // What the camera has left behind before it came.
-        for (_, (due, _)) in self.missing.extract_if(|_, (_, wanted)| *wanted != plans) {
-            waits.push(NodeWait { due, end: now, came: false });
-        }
-        ledger.add_nodes(waits);
-        waits.clear();
-        let is_open = engine.look_at_clouds(|clouds| clouds.iter().all(|c| c.boot.is_some()));
-        self.index_since = (!is_open || plan.pages_loading > 0).then_some(since);
-        self.note_picture(engine, plan, now);
     }
 
-    fn note_node(&mut self, node: WantedNode, since: Instant, now: Instant) {
-        let id = (node.cloud, node.key);
-        if !node.is_there {
-            self.missing.entry(id).or_insert((since, 0)).1 = self.plans;
-            return;
-        }
-        if let Some((due, _)) = self.missing.remove(&id) {
-            self.waits.push(NodeWait { due, end: now, came: true });
-        }
-        // More where it is drawn more exactly than before.
-        let used = self.used.entry(id).or_default();
-        *used = node.bytes.max(*used);
-    }
-
-    fn note_picture(&mut self, engine: &TaskedEngine, plan: &FramePlan, now: Instant) {
+    /// A plan has come: what it shows.
+    fn note_picture(&mut self, engine: &TaskedEngine, plan: &FramePlan) {
         let Some(picture) = &mut self.picture else { return };
         if plan.view_generation < picture.generation || picture.settled.is_some() {
             return;
         }
-        let wait = now.saturating_duration_since(picture.due);
+        let wait = picture.due.elapsed();
         if plan.points > 0 {
             picture.first.get_or_insert(wait);
         }
@@ -246,9 +217,8 @@ impl<'a> Log<'a> {
     fn end(mut self, engine: &TaskedEngine, ending: &Ending) {
         let now = Instant::now();
         self.end_picture(now);
-        let left = self.missing.values().map(|&(due, _)| NodeWait { due, end: now, came: false });
-        self.waits.extend(left);
-        self.ledger.add_nodes(&self.waits);
+        let left: Vec<_> = take(&mut self.awaited).give_up(now).collect();
+        self.ledger.add_nodes(&left);
         let stats = engine.stats();
         let totals = stats.since_start.totals;
         let index = engine.look_at_clouds(|clouds| {

@@ -2,7 +2,8 @@
 //!
 //! Halves are split in the middle of their points, not of their space: a scan is dense at its
 //! stations and empty between them, and millions of points may lie on one place. Of the points
-//! themselves, without nodes, so that a tree takes 17 bytes a point.
+//! themselves, without nodes, so that a tree takes 17 bytes a point. (The index of `numerics` is over
+//! points in Morton order, and finds several: here they are in none, and a search for one begins with a guess.)
 
 /// Points that are looked through one after the other.
 const LEAF_POINTS: usize = 8;

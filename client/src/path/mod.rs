@@ -23,6 +23,9 @@ mod spline;
 #[cfg(test)]
 mod tests;
 
+#[cfg(test)]
+pub(crate) use generate::Random;
+
 pub use camera_path::{CameraPath, MAX_KEYS};
 pub use error::PathError;
 pub use file::{FORMAT, VERSION};

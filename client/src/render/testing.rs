@@ -4,32 +4,12 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use glam::DVec3;
 use lodestream_protocol::{
-    Attribute, Column, GroupInfo, Lattice, LatticeBox, Manifest, Method, NodeKey, NodePoints,
-    Primitive, Refinement, ScalarType, Storage,
+    Attribute, Column, GroupInfo, Lattice, LatticeBox, Manifest, NodeKey, NodePoints, ScalarType,
+    Storage,
 };
 
 use crate::{engine::DrawNode, render::Scene};
-
-/// A manifest without points and attributes.
-pub fn manifest() -> Manifest {
-    Manifest {
-        generator: "test".into(),
-        points: 0,
-        nodes: 0,
-        levels: 0,
-        refinement: Refinement::Additive,
-        primitive: Primitive::Point,
-        method: Method { name: "test".into(), grid: 128, leaf_capacity: 1000 },
-        lattice: Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits: 16 },
-        bounds: LatticeBox::EMPTY,
-        largest_rounding: 0.0,
-        attributes: Vec::new(),
-        groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
-        fine: None,
-        crs: None,
-        sources: Vec::new(),
-    }
-}
+pub(crate) use crate::{engine::testing::manifest, path::Random};
 
 /// A point of a synthetic cloud.
 #[derive(Debug, Clone, Copy)]
@@ -73,24 +53,6 @@ impl TestScene {
         let nodes = other.nodes.into_iter();
         self.nodes.extend(nodes.map(|node| DrawNode { cloud: node.cloud + first, ..node }));
         self
-    }
-}
-
-/// A small generator of reproducible numbers (SplitMix64).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    /// 0 to 1.
-    pub fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 
@@ -159,7 +121,7 @@ pub fn cloud(lattice: Lattice, levels: u8, points: &[Point]) -> TestScene {
 
 /// A room-sized scene in a cube of 2^`side_bits` lattice units: rolling ground, a ball, a wall.
 pub fn landscape(side_bits: u8, count: usize) -> Vec<Point> {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let side = f64::from(side_bits).exp2();
     let mut points = Vec::with_capacity(count);
     for index in 0..count {

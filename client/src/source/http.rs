@@ -233,7 +233,9 @@ impl HttpSource {
                 let content_type = response.headers().get(header::CONTENT_TYPE);
                 return Ok(content_type.is_some_and(|t| t == BATCH_TYPE).then_some(response));
             }
-            StatusCode::PRECONDITION_FAILED => return Err(self.changed()),
+            // Either the file was replaced, or what lies between answers so whatever is there. What the ranges'
+            // answers come from tells which: they are asked for next, and are not taken from another file.
+            StatusCode::PRECONDITION_FAILED => return Ok(None),
             StatusCode::RANGE_NOT_SATISFIABLE => {
                 let message = "a part is beyond the end of the file: cut short";
                 return Err(self.permanent(message).of(Fault::Status(status.as_u16())));

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use lodestream_preprocess::{BuildConfig, BuildReport, FileSource, Method, Progress, build};
-use lodestream_protocol::{Dataset, Node, NodeKey};
+use lodestream_protocol::{
+    Dataset, GroupInfo, Lattice, LatticeBox, Manifest, Node, NodeKey, Primitive, Refinement,
+};
 use tempfile::TempDir;
 
 use super::{
@@ -68,6 +70,31 @@ pub(super) struct Built {
     pub path: PathBuf,
     pub report: BuildReport,
     _folder: TempDir,
+}
+
+/// The manifest of a single point, at the lowest corner of its lattice, for cases that need no file.
+pub(super) fn manifest(lattice: Lattice) -> Manifest {
+    Manifest {
+        generator: "lodestream stability".into(),
+        points: 1,
+        nodes: 1,
+        levels: 1,
+        refinement: Refinement::Additive,
+        primitive: Primitive::Point,
+        method: lodestream_protocol::Method {
+            name: "poisson".into(),
+            grid: 128,
+            leaf_capacity: 32_768,
+        },
+        lattice,
+        bounds: LatticeBox { min: [0; 3], max: [0; 3] },
+        largest_rounding: 0.0,
+        attributes: Vec::new(),
+        groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
+        fine: None,
+        crs: None,
+        sources: Vec::new(),
+    }
 }
 
 struct Quiet;

@@ -10,7 +10,7 @@ use lodestream_client::source::LinkSpec;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     net::{TcpListener, TcpStream},
-    sync::mpsc::UnboundedSender,
+    sync::{Barrier, mpsc::UnboundedSender},
     time::{Instant, sleep, sleep_until},
 };
 
@@ -42,6 +42,8 @@ pub enum Answer {
     Hang { share: f64, reached: UnboundedSender<()> },
     /// The answer comes later, its halves apart.
     Late(Duration),
+    /// As good, once as many requests wait for their answers as the barrier is for.
+    Together(Arc<Barrier>),
     /// Announces (and sends) as many bytes from somewhere else in the file.
     WrongRange,
     /// Announces the right range, but sends the file's bytes turned over.
@@ -271,6 +273,11 @@ async fn reply(
             send_body(stream, state, part(0.5)).await?;
             sleep(delay).await;
             send_body(stream, state, &body[part(0.5).len()..]).await
+        }
+        Answer::Together(barrier) => {
+            barrier.wait().await;
+            send(stream, &good).await?;
+            send_body(stream, state, &body).await
         }
         Answer::WrongRange => {
             let shifted = if start > 0 { (start - 1, end - 1) } else { (start + 1, end + 1) };

@@ -1,10 +1,10 @@
 //! Requests for many parts: of our server, and of hosts that turn out not to take them.
 
-use std::net::SocketAddr;
+use std::{net::SocketAddr, sync::Arc};
 
 use lodestream_client::{
     engine::{Engine, EngineConfig, Totals},
-    source::{HttpSource, Source},
+    source::{HttpSource, Source, Wire},
 };
 use lodestream_protocol::BatchPart;
 use lodestream_server::{RunningServer, ServeConfig, spawn};
@@ -14,7 +14,7 @@ use crate::{
         dataset::{Recipe, dataset},
         host::{Answer, Host},
     },
-    picture::{LONG, Picture, config, expected, http_source, overview, picture},
+    picture::{LONG, Picture, config, expected, http_source, meter, overview, picture},
 };
 
 /// A tag, and an offer that comes with it.
@@ -61,15 +61,22 @@ fn batches_bring_the_same_picture_with_fewer_bytes() {
 fn a_host_that_bars_what_it_offered_is_asked_for_ranges() {
     let bytes = dataset(Recipe::default());
     let expected = expected(&bytes, &config(), overview(Recipe::default().corner));
-    let host = Host::start(bytes, |request| match request.range {
-        Some(_) => Answer::Tagged(OFFER),
-        None => Answer::Status(405),
-    });
-    let (found, totals) = stream(http_source(&host), config());
-    assert!(found == expected);
-    assert_eq!(totals.retries, 0);
-    let batches = host.requests().iter().filter(|request| request.range.is_none()).count();
-    assert!(batches > 0, "it was never asked");
+    // The last says that the file was replaced, though it never is.
+    for status in [405, 412] {
+        let host = Host::start(bytes.clone(), move |request| match request.range {
+            Some(_) => Answer::Tagged(OFFER),
+            None => Answer::Status(status),
+        });
+        let (found, totals) = stream(http_source(&host), config());
+        assert!(found == expected);
+        assert_eq!(totals.retries, 0);
+        let requests = host.requests();
+        let batches = requests.iter().filter(|request| request.range.is_none()).count();
+        // Those that are on their way together, at most.
+        assert!((1..=config().requests_in_flight).contains(&batches), "{batches} batches");
+        let openings = requests.iter().filter(|r| r.range.is_some_and(|(from, _)| from == 0));
+        assert_eq!(openings.count(), 1, "{status}: it was opened anew");
+    }
 }
 
 #[test]
@@ -93,14 +100,23 @@ fn parts_come_back_to_back_whether_batches_are_offered_or_not() {
 }
 
 #[tokio::test]
-async fn a_dataset_that_was_replaced_is_told_from_the_one_in_use() {
+async fn a_dataset_that_was_replaced_is_told_from_the_one_in_use_and_batches_go_on() {
     let (folder, _server, url) = serve(&dataset(Recipe::default()));
-    let source = source(&url);
+    let meter = meter();
+    let wire = Wire { link: None, meter: Some(Arc::clone(&meter)) };
+    let source = Source::by_wire(&url, wire).expect("a URL");
     source.read_prefix(100).await.expect("a good host");
     let other = dataset(Recipe { seed: 2, ..Recipe::default() });
-    std::fs::write(folder.path().join("b"), other).expect("writable");
+    std::fs::write(folder.path().join("b"), &other).expect("writable");
     std::fs::rename(folder.path().join("b"), folder.path().join("a.lods")).expect("one folder");
     let parts = [BatchPart { offset: 0, bytes: 10 }, BatchPart { offset: 50, bytes: 10 }];
-    let error = source.stream_parts(&parts, &mut |_| {}).await.expect_err("another file");
+    let error = source.stream_parts(&parts, &mut |_| panic!("bytes")).await.expect_err("another");
     assert!(!error.is_transient() && error.to_string().contains("replaced"), "{error}");
+    let renewed = source.renew().expect("an address");
+    renewed.read_prefix(100).await.expect("a good host");
+    let (asked, mut found) = (meter.requests(), Vec::new());
+    let mut sink = |piece: bytes::Bytes| found.extend_from_slice(&piece);
+    renewed.stream_parts(&parts, &mut sink).await.expect("a good host");
+    assert!(found == [&other[..10], &other[50..60]].concat());
+    assert_eq!(meter.requests() - asked, 1, "both by one request");
 }

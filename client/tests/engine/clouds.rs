@@ -334,6 +334,28 @@ fn a_cloud_that_has_failed_is_tried_again_by_itself_and_the_others_go_on() {
 }
 
 #[test]
+fn a_cloud_that_fails_while_its_first_bytes_come_is_tried_again_once_they_have_ended() {
+    let bytes = dataset(Recipe::default());
+    let expected = expected(&bytes, &config(), view());
+    let (reached, mut hanging) = tokio::sync::mpsc::unbounded_channel();
+    // Half of the first bytes hold the index: the cloud is open.
+    let mut host = Host::start(bytes, move |request| match request.number {
+        0 => Answer::Hang { share: 0.5, reached: reached.clone() },
+        _ => Answer::Status(404),
+    });
+    let engine = Engine::start(vec![http_source(&host)], config()).expect("starts");
+    hanging.blocking_recv().expect("the first bytes come");
+    engine.set_view(view());
+    wait_for(&engine, |clouds| clouds[0].boot.is_some() && clouds[0].failure.is_some());
+    host.behave(|_| Answer::Good);
+    // They break off: nothing of the cloud is on its way any more.
+    host.stop();
+    host.restart();
+    wait_for(&engine, |clouds| clouds[0].failure.is_none());
+    assert_eq!(picture(&settle(&engine)), expected);
+}
+
+#[test]
 fn a_cloud_that_could_never_be_opened_is_opened_when_that_is_asked_for() {
     let bytes = dataset(Recipe::default());
     let host = Host::start(bytes.clone(), |_| Answer::Status(404));

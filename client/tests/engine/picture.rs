@@ -1,13 +1,14 @@
 //! Engines, cameras, and plans that can be compared.
 
-use std::{path::Path, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use glam::DVec3;
 use lodestream_client::{
     camera::Camera,
     engine::{Engine, EngineConfig, EngineError, View},
-    source::{HttpSource, Source, Timeouts},
+    source::{HttpSource, Meter, Source, Timeouts},
 };
+use tokio::time::Instant;
 
 pub use crate::common::drawn::{Picture, picture};
 use crate::common::host::Host;
@@ -50,6 +51,11 @@ pub fn source_with_patience(host: &Host, patience: Duration) -> Source {
     let timeouts = Timeouts { connect: patience, silence: patience };
     let url = host.url().parse().expect("a URL");
     Source::Http(HttpSource::with_timeouts(url, timeouts))
+}
+
+/// Counts requests, and lets all pass.
+pub fn meter() -> Arc<Meter> {
+    Arc::new(Meter::new(Instant::now(), Duration::from_secs(1), u64::MAX))
 }
 
 /// What the local file settles on.

@@ -1,19 +1,20 @@
 //! Engines as tasks: the same nodes as an engine with threads of its own, and nothing left behind.
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::HashSet, iter::successors, sync::Arc};
 
 use lodestream_client::{
-    engine::{Commons, EngineConfig, FramePlan, Payloads, TaskedEngine, View},
+    engine::{Commons, EngineConfig, FramePlan, MissingPage, Payloads, TaskedEngine, View},
     source::{HttpSource, Meter, Source, Timeouts, Wire},
 };
-use tokio::{sync::mpsc::unbounded_channel, time::Instant};
+use lodestream_protocol::Refinement;
+use tokio::sync::mpsc::unbounded_channel;
 
 use crate::{
     common::{
         dataset::{Recipe, dataset},
         host::{Answer, Host},
     },
-    picture::{LONG, Picture, config, expected, overview, picture},
+    picture::{LONG, Picture, config, expected, meter, overview, picture},
 };
 
 fn runtime() -> tokio::runtime::Runtime {
@@ -33,10 +34,6 @@ fn metered(host: &Host, meter: &Arc<Meter>) -> Source {
     let wire = Wire { link: None, meter: Some(Arc::clone(meter)) };
     let url = host.url().parse().expect("a URL");
     Source::Http(HttpSource::by_wire(url, timeouts, wire))
-}
-
-fn meter() -> Arc<Meter> {
-    Arc::new(Meter::new(Instant::now(), Duration::from_secs(1), u64::MAX))
 }
 
 async fn settle(engine: &mut TaskedEngine, view: View) -> Arc<FramePlan> {
@@ -126,4 +123,52 @@ fn an_engine_that_is_dropped_breaks_its_requests_off() {
         let counted = meter.counted();
         assert!(counted.broken_off > 0 && counted.all_faults() == 0, "{counted:?}");
     });
+}
+
+#[test]
+fn what_becomes_wanted_without_another_view_lies_below_a_page_that_was_missing() {
+    for refinement in [Refinement::Additive, Refinement::Replace] {
+        let recipe = Recipe { refinement, ..Recipe::default() };
+        let host = Host::good(dataset(recipe));
+        let beside = Host::good(dataset(Recipe { seed: 2, ..recipe }));
+        // Pages come in several turns, and not with the header.
+        let config = EngineConfig { speculative_bytes: 0, requests_in_flight: 1, ..counting() };
+        runtime().block_on(async {
+            let sources = [&host, &beside].map(|host| metered(host, &meter())).to_vec();
+            let mut engine = TaskedEngine::start(sources, config, Arc::default());
+            let whole = overview(recipe.corner);
+            let mut near = whole;
+            near.camera.eye = 0.5 * (near.camera.eye + near.camera.target);
+            let (mut below_first, mut below_further) = (0, 0);
+            for view in [whole, near] {
+                let generation = engine.set_view(view);
+                let mut before: Option<(HashSet<_>, HashSet<_>)> = None;
+                loop {
+                    let plan = engine.next_plan().await;
+                    let pages: HashSet<_> = engine.missing_pages().collect();
+                    let further = pages.iter().filter(|page| page.below.is_some()).count();
+                    assert_eq!(further as u64, plan.pages_loading);
+                    let wanted: HashSet<_> = engine.wanted().map(|n| (n.cloud, n.key)).collect();
+                    if let Some((wanted_before, missing)) = &before {
+                        for &(cloud, key) in wanted.difference(wanted_before) {
+                            let is_missing =
+                                |below| missing.contains(&MissingPage { cloud, below });
+                            let mut above = successors(key.parent(), |key| key.parent());
+                            let is_below = above.any(|key| is_missing(Some(key)));
+                            assert!(is_below || is_missing(None), "{cloud} {key}");
+                            below_further += u32::from(is_below);
+                            below_first += u32::from(!is_below);
+                        }
+                    }
+                    if plan.settled && plan.view_generation == generation {
+                        break;
+                    }
+                    if plan.view_generation == generation {
+                        before = Some((wanted, pages));
+                    }
+                }
+            }
+            assert!(below_first > 0 && below_further > 20, "{below_first} {below_further}");
+        });
+    }
 }

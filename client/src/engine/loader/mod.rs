@@ -15,6 +15,8 @@ mod open;
 mod openings;
 mod pace;
 mod pieces;
+#[cfg(test)]
+mod tests;
 
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap, HashSet},

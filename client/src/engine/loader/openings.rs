@@ -42,7 +42,9 @@ const MAX_PREFIX_BYTES: u64 = 32 << 20;
 #[derive(Debug)]
 pub struct OpeningTask {
     /// The cloud that its news are about.
-    cloud: usize,
+    pub cloud: usize,
+    /// Whether its answer was on its way before the cloud failed: then it does not say that the cloud is back.
+    is_outdated: bool,
     task: AbortHandle,
 }
 
@@ -165,7 +167,8 @@ impl Loader {
             }
             let _ = sender.send(Message::Ended { id });
         });
-        self.openings.insert(id, OpeningTask { cloud, task: task.abort_handle() });
+        let task = task.abort_handle();
+        self.openings.insert(id, OpeningTask { cloud, is_outdated: false, task });
     }
 
     fn stop_opening(&mut self, cloud: usize) {
@@ -181,8 +184,11 @@ impl Loader {
     }
 
     pub(super) fn fail_opening(&mut self, id: OpeningId, message: String) {
-        if let Some(opening) = self.openings.get(&id) {
-            self.fail_cloud(opening.cloud, message);
+        if let Some(opening) = self.openings.get_mut(&id) {
+            // What it will tell is of a new try.
+            opening.is_outdated = false;
+            let cloud = opening.cloud;
+            self.fail_cloud(cloud, message);
         }
     }
 
@@ -192,7 +198,7 @@ impl Loader {
             opening = opening.shared(commons);
         }
         // One that was broken off is no longer there.
-        let Some(cloud) = self.openings.get(&id).map(|opening| opening.cloud) else { return };
+        let Some(&OpeningTask { cloud, is_outdated, .. }) = self.openings.get(&id) else { return };
         let Some(known) = self.clouds.get_mut(&cloud) else { return };
         let boot = &opening.boot;
         let cloud = match &known.boot {
@@ -202,7 +208,7 @@ impl Loader {
                 cloud
             }
             Some(last) if last.header.content_id == boot.header.content_id => {
-                if known.is_in_doubt {
+                if known.is_in_doubt && !is_outdated {
                     self.shared.traversal.post(Event::CloudIsBack { cloud });
                 }
                 cloud
@@ -211,7 +217,9 @@ impl Loader {
         };
         let Some(known) = self.clouds.get_mut(&cloud) else { return };
         known.boot.get_or_insert(opening.boot);
-        (known.failed, known.is_in_doubt) = (false, false);
+        if !is_outdated {
+            (known.failed, known.is_in_doubt) = (false, false);
+        }
         known.source = source;
         known.prefix = opening.prefix;
         known.prefix_end = opening.expected;
@@ -240,7 +248,7 @@ impl Loader {
             let doubts = old.doubts;
             let new = Cloud { doubts, ..Cloud::new(old.number, old.source.clone()) };
             self.clouds.insert(by, new);
-            opening.cloud = by;
+            (opening.cloud, opening.is_outdated) = (by, false);
         }
         self.drop_cloud(cloud);
         self.shared.counters.useful_bytes.add(opening.boot.header.index_bytes());
@@ -256,6 +264,8 @@ impl Loader {
             self.shared.trouble(number, Some(error.to_string()));
             self.doubt(cloud);
         } else {
+            let openings = self.openings.values_mut().filter(|opening| opening.cloud == cloud);
+            openings.for_each(|opening| opening.is_outdated = true);
             self.fail_cloud(cloud, error.to_string());
         }
     }

@@ -18,5 +18,8 @@ mod zoom;
 #[cfg(test)]
 mod tests;
 
+#[cfg(test)]
+pub(crate) use random::Random;
+
 pub use extent::Extent;
 pub use spec::{GENERATORS, PathSpec};

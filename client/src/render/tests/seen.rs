@@ -17,7 +17,7 @@ fn the_point_that_is_seen_has_the_pictures_depth_under_every_splat_size_and_proj
     let orthographic = Camera { projection, ..perspective };
     let sizes = [SplatSize::Pixels(1.0), SplatSize::Pixels(7.0), SplatSize::World(0.2)];
     let more = [SplatSize::Level(1.3), SplatSize::Adaptive(1.6), SplatSize::Own];
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for camera in [perspective, orthographic] {
         for (splat, name) in Splat::ALL {
             for size in sizes.into_iter().chain(more) {

@@ -2,13 +2,12 @@
 
 use fastrand::Rng;
 use lodestream_protocol::{
-    Attribute, Domain, GroupInfo, Lattice, LatticeBox, Manifest, Method, MortonCode, Node, NodeKey,
-    PayloadRef, Primitive, Refinement, ScalarType, Storage, decode_group, encode_column,
-    encode_positions,
+    Attribute, Domain, GroupInfo, Lattice, LatticeBox, Manifest, MortonCode, Node, NodeKey,
+    PayloadRef, ScalarType, Storage, decode_group, encode_column, encode_positions,
 };
 
 use super::Rows;
-use crate::stability::Row;
+use crate::stability::{Row, dataset};
 
 const EXACT: &str = "lossless: every bit";
 const REFERENCE: &str = "the bytes that were encoded";
@@ -157,21 +156,7 @@ fn node(points: usize, payload: &[u8]) -> Node {
 }
 
 fn manifest(side_bits: u8, attributes: Vec<Attribute>) -> Manifest {
-    Manifest {
-        generator: "lodestream stability".into(),
-        points: 0,
-        nodes: 1,
-        levels: 1,
-        refinement: Refinement::Additive,
-        primitive: Primitive::Point,
-        method: Method { name: "poisson".into(), grid: 128, leaf_capacity: 32_768 },
-        lattice: Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits },
-        bounds: LatticeBox::EMPTY,
-        largest_rounding: 0.0,
-        groups: vec![GroupInfo { name: "base".into(), columns: vec![0; 1 + attributes.len()] }],
-        attributes,
-        fine: None,
-        crs: None,
-        sources: Vec::new(),
-    }
+    let lattice = Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits };
+    let groups = vec![GroupInfo { name: "base".into(), columns: vec![0; 1 + attributes.len()] }];
+    Manifest { groups, attributes, ..dataset::manifest(lattice) }
 }

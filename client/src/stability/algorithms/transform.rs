@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 use fastrand::Rng;
 use glam::DVec3;
-use lodestream_protocol::{
-    GroupInfo, Lattice, LatticeBox, Manifest, Method, NodeKey, NodePoints, Primitive, Refinement,
-};
+use lodestream_protocol::{Lattice, Manifest, NodeKey, NodePoints};
 
 use super::Rows;
 use crate::{
@@ -14,6 +12,7 @@ use crate::{
     render::{CpuRenderer, DrawNode, LARGEST_SIDE_PX, RenderSettings, Scene, Splat, view::View},
     stability::{
         Row, StabilityError,
+        dataset::manifest,
         exact::{Big, Big3, apart, big, big3, dot, length, relative, rounded, whole},
     },
 };
@@ -239,24 +238,4 @@ fn extreme_picture(case: &'static str, size_px: [u32; 2]) -> Result<Row, Stabili
 fn point_of(cloud: usize) -> DrawNode {
     let points = NodePoints { positions: vec![[0; 3]], ..NodePoints::new(NodeKey::ROOT) };
     DrawNode { cloud, key: NodeKey::ROOT, spacing: 1.0, points: Arc::new(points), part: 0 }
-}
-
-fn manifest(lattice: Lattice) -> Manifest {
-    Manifest {
-        generator: "lodestream stability".into(),
-        points: 1,
-        nodes: 1,
-        levels: 1,
-        refinement: Refinement::Additive,
-        primitive: Primitive::Point,
-        method: Method { name: "poisson".into(), grid: 128, leaf_capacity: 32_768 },
-        lattice,
-        bounds: LatticeBox { min: [0; 3], max: [0; 3] },
-        largest_rounding: 0.0,
-        attributes: Vec::new(),
-        groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
-        fine: None,
-        crs: None,
-        sources: Vec::new(),
-    }
 }

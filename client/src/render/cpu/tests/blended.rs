@@ -6,7 +6,7 @@ const BLENDED: [Splat; 3] = [Splat::Blended, Splat::BlendedDisc, Splat::BlendedE
 
 /// A slanted wall of splats of random colours, and one of a single colour behind it.
 fn walls(behind: f64) -> Vec<Surfel> {
-    let mut random = crate::render::testing::Random(3);
+    let mut random = crate::render::testing::Random::new(3);
     let mut surfels = Vec::new();
     for (i, j) in (-12..=12).flat_map(|i| (-10..=10).map(move |j| (i, j))) {
         let (right, up) = (f64::from(i) + random.unit(), f64::from(j) + random.unit());

@@ -9,7 +9,7 @@ pub(in crate::render) const ALL: [&str; 4] = ["normal", "axis_u", "axis_v", "rad
 
 /// A cloud around a place, of surfels that lie in all directions.
 pub(in crate::render) fn ball(center: DVec3, radius: f64, count: usize) -> Vec<Surfel> {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let mut direction = || {
         let unit = [0; 3].map(|_| 2.0 * random.unit() - 1.0);
         DVec3::from(unit).normalize_or(DVec3::X)
