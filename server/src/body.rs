@@ -1,7 +1,7 @@
 //! The body of a response: ranges of a file, read piece by piece as the client takes it.
 //!
-//! Pieces are read by position into recycled buffers. While the system has the bytes in its cache,
-//! that is done in place (`preadv2` with `RWF_NOWAIT`, which never waits for the disk); the rest
+//! Pieces are read by position into recycled buffers. While the system has the bytes of a local disk in its
+//! cache, that is done in place (`preadv2` with `RWF_NOWAIT`, which never waits for the disk); the rest
 //! goes to the blocking pool. Whatever was read counts only if the file is unchanged afterwards, so
 //! that a file which is cut short or written to is never sent as what it was. The obvious other way,
 //! slices of a memory map, saves a copy, but
@@ -23,17 +23,23 @@ use std::{
     pin::Pin,
     sync::Arc,
     task::{Context, Poll, ready},
+    time::Duration,
 };
 
 use bytes::{Buf, Bytes};
 use http_body::{Body, Frame, SizeHint};
-use tokio::task::JoinHandle;
+use tokio::time::timeout;
 
 use crate::{
     buffers::{Buffer, BufferPool, PIECE_BYTES},
+    disk,
     file::DatasetFile,
     storage::Source,
 };
+
+/// A piece that takes longer to read never comes: the response is broken off. A piece of an object takes two
+/// requests at most.
+const READ_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// What a response is made of.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,7 +60,6 @@ impl Segment {
 }
 
 /// Ranges of a file, with or without something in between.
-#[derive(Debug)]
 pub(crate) struct FileBody {
     /// Bytes that are still to be sent.
     left: u64,
@@ -62,13 +67,15 @@ pub(crate) struct FileBody {
     state: State,
 }
 
-#[derive(Debug)]
 enum State {
     Ready(Rest),
     /// A piece is being read on the blocking pool.
-    Reading(JoinHandle<(Rest, io::Result<Buffer>)>),
+    Reading(Reading),
     Ended,
 }
+
+/// A piece that is waited for, no longer than [`READ_TIMEOUT`], and what comes after it.
+type Reading = Pin<Box<dyn Future<Output = io::Result<(Rest, io::Result<Buffer>)>> + Send>>;
 
 /// What is still to be read.
 #[derive(Debug)]
@@ -116,23 +123,19 @@ impl FileBody {
                 State::Ready(mut rest) => {
                     let mut buffer = self.pool.take();
                     let wanted = usize::try_from(self.left).unwrap_or(usize::MAX).min(PIECE_BYTES);
-                    if rest.fill(&mut buffer, wanted, read_cached).is_ok() {
+                    if rest.is_here() && rest.fill(&mut buffer, wanted, read_cached).is_ok() {
                         let checked = rest.check();
                         self.state = State::Ready(rest);
                         return Poll::Ready(checked.map(|()| buffer));
                     }
-                    self.state = State::Reading(tokio::task::spawn_blocking(move || {
-                        let read = rest.fill(&mut buffer, wanted, read_waiting);
-                        let read = read.and_then(|()| rest.check());
-                        (rest, read.map(|()| buffer))
-                    }));
+                    self.state = State::Reading(rest.read(buffer, wanted));
                 }
-                State::Reading(mut reading) => match Pin::new(&mut reading).poll(cx) {
+                State::Reading(mut reading) => match reading.as_mut().poll(cx) {
                     Poll::Ready(Ok((rest, piece))) => {
                         self.state = State::Ready(rest);
                         return Poll::Ready(piece);
                     }
-                    Poll::Ready(Err(e)) => return Poll::Ready(Err(io::Error::other(e))),
+                    Poll::Ready(Err(e)) => return Poll::Ready(Err(e)),
                     Poll::Pending => {
                         self.state = State::Reading(reading);
                         return Poll::Pending;
@@ -152,6 +155,28 @@ impl FileBody {
 }
 
 impl Rest {
+    /// Whether the system can tell at once what it has of the file, and whether that is unchanged.
+    fn is_here(&self) -> bool {
+        self.file.is_local || matches!(self.file.source, Source::Object(_))
+    }
+
+    /// Reads a piece on the blocking pool.
+    fn read(mut self, mut buffer: Buffer, wanted: usize) -> Reading {
+        let is_here = self.is_here();
+        let work = move || {
+            let read = self.fill(&mut buffer, wanted, read_waiting);
+            let read = read.and_then(|()| self.check());
+            (self, read.map(|()| buffer))
+        };
+        Box::pin(async move {
+            let read = async {
+                if is_here { disk::on_pool(work).await } else { disk::elsewhere(work).await }
+            };
+            let read = timeout(READ_TIMEOUT, read).await;
+            read.map_err(|_| io::Error::new(io::ErrorKind::TimedOut, "the file cannot be read"))
+        })
+    }
+
     /// Reads on until the buffer holds `wanted` bytes, which there are. An error leaves behind what was
     /// read before it, and goes on from there when it is called again.
     fn fill(
@@ -249,11 +274,8 @@ fn read_waiting(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::
 }
 
 /// Reads some bytes that can be had without waiting for the disk; at least one. Where the file system
-/// cannot tell, there are none; nor where it may wait to tell whether the file is unchanged.
+/// cannot tell, there are none.
 fn read_cached(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::Result<usize> {
-    if matches!(file.source, Source::File(_)) && !file.is_local {
-        return Err(io::ErrorKind::WouldBlock.into());
-    }
     match file.source.read_cached(buffer, rest.start)? {
         0 => Err(io::ErrorKind::WouldBlock.into()),
         count => Ok(count),
@@ -292,6 +314,20 @@ mod tests {
         let mut body = body(file, vec![Segment::File(0..100)]);
         assert!(body.next().await.expect("an end").is_err());
         assert!(body.next().await.is_none());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_read_that_never_ends_breaks_the_response_off() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut file = dataset(&folder);
+        file.is_local = false;
+        let mut body = body(file, vec![Segment::File(0..100)]);
+        let hanging = disk::hang().await;
+        let piece = timeout(2 * READ_TIMEOUT, body.next()).await.expect("it is given up");
+        let error = piece.expect("an end").expect_err("it cannot be read");
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+        assert!(body.next().await.is_none());
+        drop(hanging);
     }
 
     #[tokio::test]

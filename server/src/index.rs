@@ -1,10 +1,10 @@
 //! The list of datasets.
 
 use std::{
-    collections::{HashMap, HashSet},
+    collections::HashMap,
     io,
     sync::Arc,
-    time::SystemTime,
+    time::{Duration, Instant, SystemTime},
 };
 
 use lodestream_protocol::{Attribute, Dataset, ScalarType};
@@ -17,7 +17,7 @@ use crate::{
     access::Rights,
     conditional::http_date,
     file::{OpenError, UNANSWERED},
-    storage::{Identity, Listing, Readable, SUFFIX, Source, Storage, dataset_name},
+    storage::{Identity, Listing, Readable, SUFFIX, Source, Storage, Warmed, dataset_name},
 };
 
 /// Characters of a path segment that need no escape (RFC 3986, section 2.3).
@@ -106,6 +106,10 @@ pub struct UnreadableEntry {
     pub reason: String,
 }
 
+/// Once so much time was lost to datasets that are not to be had, no more are asked for until the list is made again: a
+/// store that has fallen silent costs as much for each.
+const MOST_LOST: Duration = Duration::from_secs(20);
+
 /// Makes the list, and remembers the entries of files that have not changed since.
 #[derive(Debug, Default)]
 pub(crate) struct IndexCache {
@@ -133,8 +137,8 @@ impl IndexCache {
                 known.get(*name).is_some_and(|known| listing.is_still(name, &known.identity))
             };
             let new = listing.datasets.iter().filter(|name| !is_still(name));
-            let unanswered = storage.warm(&new.cloned().collect::<Vec<_>>()).await;
-            let look = move || look(&storage, &listing, known, &unanswered);
+            let warmed = storage.warm(&new.cloned().collect::<Vec<_>>()).await;
+            let look = move || look(&storage, &listing, known, warmed);
             let looking = tokio::task::spawn_blocking(look);
             let (index, known) = looking.await.map_err(io::Error::other)?;
             *entries = known;
@@ -149,16 +153,24 @@ fn look(
     storage: &Storage,
     listing: &Listing,
     mut known: HashMap<String, Known>,
-    unanswered: &HashSet<String>,
+    mut warmed: Warmed,
 ) -> (DatasetIndex, HashMap<String, Known>) {
     let mut index = DatasetIndex::default();
     let mut entries = HashMap::with_capacity(listing.datasets.len());
+    let mut lost = Duration::ZERO;
     for file_name in &listing.datasets {
         let known = known.remove(file_name);
-        let found = match unanswered.contains(file_name) {
-            true => Err(OpenError::Unanswered),
-            false => look_at(storage, listing, file_name, known),
-        };
+        let begin = Instant::now();
+        let found =
+            match known.filter(|known| storage.is_still(listing, file_name, &known.identity)) {
+                None if lost >= MOST_LOST => Err(OpenError::Unanswered),
+                None => look_at(storage, file_name, &mut warmed),
+                Some(known) => Ok(known),
+            };
+        if found.is_err() {
+            lost += begin.elapsed();
+        }
+        let found = found.map(|found| with_preview(found, storage, listing, file_name));
         let reason = match found {
             Ok(found) => {
                 index.datasets.push(found.entry.clone());
@@ -174,30 +186,21 @@ fn look(
     (index, entries)
 }
 
-fn look_at(
-    storage: &Storage,
-    listing: &Listing,
-    file_name: &str,
-    known: Option<Known>,
-) -> Result<Known, OpenError> {
-    let known = known.filter(|known| storage.is_still(listing, file_name, &known.identity));
-    let mut found = match known {
-        Some(known) => known,
-        None => {
-            let Readable { identity, source, modified } = storage.readable(file_name)?;
-            let dataset =
-                Dataset::open(source).map_err(|e| OpenError::Unreadable(e.to_string()))?;
-            Known { identity, entry: entry(file_name, &dataset, modified) }
-        }
-    };
-    // A picture comes after its dataset, and may be that of the one before for a while.
+fn look_at(storage: &Storage, file_name: &str, warmed: &mut Warmed) -> Result<Known, OpenError> {
+    let Readable { identity, source, modified } = storage.readable(file_name, warmed)?;
+    let dataset = Dataset::open(source).map_err(|e| OpenError::Unreadable(e.to_string()))?;
+    Ok(Known { identity, entry: entry(file_name, &dataset, modified) })
+}
+
+/// A picture comes after its dataset, and may be that of the one before for a while.
+fn with_preview(mut found: Known, storage: &Storage, listing: &Listing, file_name: &str) -> Known {
     let entry = &mut found.entry;
     if !listing.has_preview(file_name) {
         entry.preview = None;
     } else if entry.preview.is_none() && storage.has_preview_of(file_name, &entry.content_id) {
         entry.preview = Some(format!("{}/preview.png?v={}", entry.url, entry.content_id));
     }
-    Ok(found)
+    found
 }
 
 fn entry(file_name: &str, dataset: &Dataset<Source>, modified: Option<SystemTime>) -> DatasetEntry {

@@ -10,14 +10,16 @@
 //! of that, and under load every thread has its next one out before anyone can know, with health,
 //! figures, timeouts and all other connections stuck behind it. So only what is known to lie on a
 //! [disk of this machine](crate::disk) is asked in place, and anything else on the pool whatever its
-//! time: there a hung call costs a thread that nobody waits for, and the client is answered when its
-//! time is over. (Tried with a FUSE file system that stops to answer under load: in place, not even
+//! time: there a hung call costs one of [a few threads](crate::disk::elsewhere) that nobody waits for, and the
+//! client is answered when its time is over. (Tried with a FUSE file system that stops to answer under load: in place, not even
 //! `/healthz` was answered any more.)
 
 use std::{
     sync::atomic::{AtomicU32, Ordering},
     time::{Duration, Instant},
 };
+
+use crate::disk;
 
 /// A call longer than this counts as slow.
 const PATIENCE: Duration = Duration::from_millis(1);
@@ -48,7 +50,7 @@ impl Offload {
         F: FnOnce() -> T + Send + 'static,
     {
         if !is_local {
-            return on_pool(work).await;
+            return disk::elsewhere(work).await;
         }
         let timed = || {
             let start = Instant::now();
@@ -58,7 +60,7 @@ impl Offload {
         let (result, duration) = if self.score.load(Ordering::Relaxed) < POOL_SCORE {
             timed()
         } else {
-            on_pool(timed).await
+            disk::on_pool(timed).await
         };
         self.note(duration > self.patience);
         result
@@ -76,12 +78,6 @@ impl Offload {
             self.score.store(next, Ordering::Relaxed);
         }
     }
-}
-
-async fn on_pool<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
-    // The task is never cancelled: it can only fail by a panic of `work`.
-    let outcome = tokio::task::spawn_blocking(work).await;
-    outcome.unwrap_or_else(|e| std::panic::resume_unwind(e.into_panic()))
 }
 
 #[cfg(test)]

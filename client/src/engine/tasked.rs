@@ -61,8 +61,8 @@ impl TaskedEngine {
         self.traversal.wanted()
     }
 
-    /// The parts of the indices that the newest plan lacks. A node that a plan wants, though the one before did not and
-    /// was for the same view, lies below one of those that the one before lacked.
+    /// The parts of the indices that the newest plan lacks. While view, datasets and settings stay, a node that a plan
+    /// wants, though the one before did not, lies below one of those that the one before lacked.
     pub fn missing_pages(&self) -> impl Iterator<Item = MissingPage> {
         self.traversal.unknown()
     }

@@ -67,9 +67,12 @@ impl Awaited {
         pages.filter_map(|page| self.pages.get(&page).copied()).fold(due, Instant::min)
     }
 
-    /// Nothing more comes: the waits of what has not, until `now`.
+    /// Nothing more comes: the waits of what has not, until `now`. A part of the index counts as one node: there is no
+    /// telling how many it would have been.
     pub fn give_up(self, now: Instant) -> impl Iterator<Item = NodeWait> {
-        self.nodes.into_values().map(move |(due, _)| NodeWait { due, end: now, came: false })
+        let nodes = self.nodes.into_values().map(|(due, _)| due);
+        let all = nodes.chain(self.pages.into_values());
+        all.map(move |due| NodeWait { due, end: now, came: false })
     }
 }
 
@@ -181,11 +184,11 @@ mod tests {
         visit.note((0, 0), &[node(0, &[1], false), node(0, &[2], false)], &[]);
         assert_eq!(visit.note((4, 5), &[node(0, &[2], false)], &[]), [(0, false)]);
         // Wanted again, it is due again.
-        visit.note((6, 6), &[node(0, &[1], false), node(0, &[2], false)], &[]);
+        visit.note((6, 6), &[node(0, &[1], false), node(0, &[2], false)], &[page(0, &[3])]);
         let (begin, end) = (visit.begin, visit.at(9));
         let mut left: Vec<_> = visit.awaited.give_up(end).collect();
         left.sort_by_key(|wait| wait.due);
         let seconds = left.iter().map(|wait| ((wait.due - begin).as_secs(), wait.came));
-        assert_eq!(seconds.collect::<Vec<_>>(), [(0, false), (6, false)]);
+        assert_eq!(seconds.collect::<Vec<_>>(), [(0, false), (6, false), (6, false)]);
     }
 }

@@ -22,6 +22,7 @@ use lodestream_preprocess::preview::{PREVIEW_SUFFIX, preview_content_id, preview
 
 use crate::{
     config::{DataPlace, ServeConfig},
+    disk,
     error::Result,
     file::{DatasetFile, Identity as FileIdentity, OpenError},
     metrics::StorageMetrics,
@@ -103,6 +104,9 @@ pub(crate) enum Version {
     Written(SystemTime),
 }
 
+/// Objects that were looked at together, or why they could not be.
+pub(crate) type Warmed = HashMap<String, std::result::Result<Object, OpenError>>;
+
 /// A dataset whose index can be read.
 #[derive(Debug)]
 pub(crate) struct Readable {
@@ -128,17 +132,17 @@ impl Storage {
             return objects.list().await;
         }
         let storage = Arc::clone(self);
-        let listing = tokio::task::spawn_blocking(move || match &*storage {
+        let list = move || match &*storage {
             Self::Folder(folder, _) => folder.list(),
             Self::Objects(_) => Ok(Listing::default()),
-        });
-        listing.await.map_err(io::Error::other).flatten()
+        };
+        disk::elsewhere(list).await
     }
 
-    /// Makes ready for looking at all of these, one by one; returns those that are not to be had.
-    pub(crate) async fn warm(&self, file_names: &[String]) -> HashSet<String> {
+    /// Makes ready for looking at all of these, one by one; returns what of it there is already.
+    pub(crate) async fn warm(&self, file_names: &[String]) -> Warmed {
         match self {
-            Self::Folder(..) => HashSet::new(),
+            Self::Folder(..) => Warmed::new(),
             Self::Objects(objects) => objects.warm(file_names).await,
         }
     }
@@ -155,7 +159,11 @@ impl Storage {
     }
 
     /// Opens a dataset to read its index (blocking).
-    pub(crate) fn readable(&self, file_name: &str) -> std::result::Result<Readable, OpenError> {
+    pub(crate) fn readable(
+        &self,
+        file_name: &str,
+        warmed: &mut Warmed,
+    ) -> std::result::Result<Readable, OpenError> {
         match self {
             Self::Folder(folder, _) => {
                 let path = folder.path_of(file_name).ok_or(OpenError::Missing)?;
@@ -167,8 +175,13 @@ impl Storage {
                 })
             }
             Self::Objects(objects) => {
-                let opening = objects.dataset(file_name);
-                let object = tokio::runtime::Handle::current().block_on(opening)?;
+                let object = match warmed.remove(file_name) {
+                    Some(opened) => opened?,
+                    None => {
+                        let opening = objects.dataset(file_name);
+                        tokio::runtime::Handle::current().block_on(opening)?
+                    }
+                };
                 let (identity, modified) = (object.identity(), Some(object.modified()));
                 Ok(Readable { identity, source: Source::Object(object), modified })
             }
@@ -179,8 +192,7 @@ impl Storage {
     pub(crate) async fn sweep(&self) {
         if let Self::Folder(_, open_files) = self {
             let open_files = Arc::clone(open_files);
-            // It fails only where it panics, which is on standard error then.
-            let _ = tokio::task::spawn_blocking(move || open_files.sweep()).await;
+            disk::elsewhere(move || open_files.sweep()).await;
         }
     }
 
@@ -228,8 +240,7 @@ impl Storage {
         match self {
             Self::Folder(folder, _) => {
                 let path = folder.beside(&beside);
-                let reading = tokio::task::spawn_blocking(move || SmallFile::read(&path));
-                reading.await.unwrap_or(Err(OpenError::Missing))
+                disk::elsewhere(move || SmallFile::read(&path)).await
             }
             Self::Objects(objects) => objects.small(&beside).await,
         }

@@ -7,7 +7,7 @@ use lodestream_protocol::{Error as FormatError, Header, ReadAt, Result as Format
 use object_store::{GetOptions, GetRange, ObjectMeta, path::Path};
 use tokio::runtime::Handle;
 
-use super::{Identity, Objects, Version, blocks::BLOCK_BYTES};
+use super::{Identity, Objects, Version, blocks::BLOCK_BYTES, objects::Failure};
 
 /// A dataset of the store. Reads fail once the store has other bytes under its name.
 #[derive(Debug, Clone)]
@@ -128,8 +128,12 @@ impl ReadAt for Object {
         let mut bytes = vec![0; len];
         Handle::current().block_on(self.read_into(&mut bytes, offset, 0)).map_err(|e| {
             // The error goes to clients, in the list; what the store says is not for them.
-            tracing::warn!("{:?}: {e}", self.name());
-            let message = "the object store does not give them".to_owned();
+            let message = if e.get_ref().is_some_and(|e| e.is::<Failure>()) {
+                tracing::warn!("{:?}: {e}", self.name());
+                "the object store does not give them".to_owned()
+            } else {
+                e.to_string()
+            };
             FormatError::Read { offset, len: len as u64, message }
         })?;
         Ok(bytes)

@@ -6,7 +6,6 @@
 //! of two datasets never come together, and a read of one that was replaced fails.
 
 use std::{
-    collections::HashSet,
     future::Future,
     io,
     sync::{
@@ -26,7 +25,7 @@ use quick_cache::sync::Cache;
 use tokio::{sync::Semaphore, task::JoinSet};
 
 use super::{
-    Identity, Listing, Object, SmallFile,
+    Identity, Listing, Object, SmallFile, Warmed,
     blocks::{BLOCK_BYTES, BlockCache},
     object::{ObjectState, fetch},
 };
@@ -50,7 +49,6 @@ const PATIENCE: Duration = Duration::from_secs(25);
 #[derive(Debug, Clone)]
 struct Known {
     at: Instant,
-    /// `None`: there is no such object.
     state: std::result::Result<Arc<ObjectState>, OpenError>,
 }
 
@@ -120,11 +118,10 @@ impl Objects {
     }
 
     /// Reads the first bytes of many datasets at a time, so that looking at them one by one, which
-    /// comes next, finds them in memory. Returns those that the store does not answer for: they are
-    /// not worth to be waited for again, one by one.
-    pub(crate) async fn warm(self: &Arc<Self>, file_names: &[String]) -> HashSet<String> {
+    /// comes next, has not to ask again.
+    pub(crate) async fn warm(self: &Arc<Self>, file_names: &[String]) -> Warmed {
         const AT_A_TIME: usize = 16;
-        let mut unanswered = HashSet::new();
+        let mut warmed = Warmed::new();
         let mut tasks = JoinSet::new();
         let mut left = file_names.iter();
         loop {
@@ -132,12 +129,12 @@ impl Objects {
                 let (objects, file_name) = (Arc::clone(self), file_name.clone());
                 tasks.spawn(async move {
                     let opened = objects.dataset(&file_name).await;
-                    (opened.err() == Some(OpenError::Unanswered)).then_some(file_name)
+                    (file_name, opened)
                 });
             }
             match tasks.join_next().await {
-                Some(outcome) => unanswered.extend(outcome.unwrap_or_default()),
-                None => return unanswered,
+                Some(outcome) => warmed.extend(outcome),
+                None => return warmed,
             }
         }
     }
@@ -295,7 +292,7 @@ impl Objects {
 
 /// Why the store did not answer as it should.
 #[derive(Debug, thiserror::Error)]
-enum Failure {
+pub(super) enum Failure {
     #[error("the object store: {}", told(.0))]
     Store(StoreError),
     #[error("the object store is silent")]
