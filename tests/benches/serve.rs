@@ -6,8 +6,10 @@
 //! same ones, where the threads that are busy wait for each other (with few connections nginx has often all of
 //! them on one worker, so that fewer threads share the processors: its requests are slower then, its slowest
 //! faster). The slowest hundredth is decided by whatever else takes a processor for a millisecond: behind its
-//! medians stand quartiles, and in how many turns ours was the slower. Then many nodes of 16 KiB by batches,
-//! beside nginx's by ranges, both asked by a load generator of this bench: wrk takes answers in pieces of 8
+//! medians stand quartiles, and in how many turns ours was the slower. wrk asks as fast as it is answered, so that
+//! waits are those of queues, and how much of them is seen depends on which side they form; so a load generator of this
+//! bench also asks both at the same rate, three fifths of what the slower one gives. Then many nodes of 16 KiB by batches,
+//! beside nginx's by ranges, both asked by that generator: wrk takes answers in pieces of 8
 //! KiB, which costs it more for a node than the server, and would be what is measured. At last, what
 //! batches are worth to the client's engine, on INPUT (a dataset or anything that `lodestream build` takes;
 //! without one, a simulated courtyard of 2 million points).
@@ -21,6 +23,7 @@ use std::{
     net::SocketAddr,
     path::Path,
     process::{Child, Command, Stdio},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -50,10 +53,21 @@ const NODE_BYTES: u32 = 16 << 10;
 const NODES: usize = 16;
 /// Of every measurement.
 const SECONDS: u32 = 1;
+/// Where both are asked for as much: over how many connections, and for what part of what the slower one gives.
+const RATE_CONNECTIONS: u32 = 256;
+const RATE_SHARE: f64 = 0.6;
+/// How the bench starts itself as a load generator: this, an address, bytes of a range, requests a second.
+const AT_A_RATE: &str = "--at-a-rate";
 /// Different requests that a thread of wrk repeats.
 const REQUESTS: usize = 2000;
 
 fn main() -> Result<()> {
+    let arguments: Vec<String> = std::env::args().collect();
+    if let [_, flag, addr, size, rate] = &arguments[..]
+        && flag == AT_A_RATE
+    {
+        return ask_at_a_rate(addr.parse()?, size.parse()?, rate.parse()?);
+    }
     let Options { input, runs } = Options::parse(DEFAULT_INPUT)?;
     let folder = tempfile::tempdir()?;
     write_file(&folder.path().join("bench.lods"))?;
@@ -67,7 +81,9 @@ fn main() -> Result<()> {
         println!("\nServers on one half of the cores, wrk on the other:\n");
         let ours = Server::start(folder.path(), Some(&servers.0))?;
         let rival = Nginx::start_on(folder.path(), Some((&servers.0, servers.1)))?;
-        ranges(&ours, &rival, Some(&generators), runs)?;
+        let rates = ranges(&ours, &rival, Some(&generators), runs)?;
+        println!("\nBoth asked for as much, over {RATE_CONNECTIONS} connections:\n");
+        at_a_rate(&ours, &rival, &generators, runs, &rates)?;
     }
     println!("\nServers and wrk on all cores, in each other's way:\n");
     let ours = Server::start(folder.path(), None)?;
@@ -79,7 +95,7 @@ fn main() -> Result<()> {
     println!("| connections | nodes/s | nginx | ratio | server's µs/node | nginx |");
     println!("| --- | --- | --- | --- | --- | --- |");
     let (ours_at, theirs_at) = (ours.url.trim_start_matches("http://").parse()?, rival.addr);
-    let (batches, ranges) = (batch_requests()?, node_requests());
+    let (batches, ranges) = (batch_requests()?, range_requests(NODE_BYTES.into()));
     for connections in CONNECTIONS {
         let (us, them) = by_turns(
             runs,
@@ -136,13 +152,15 @@ fn halves(processors: usize) -> Option<(Processors, Processors)> {
     })
 }
 
-/// Ranges of each size over few and many connections: the table.
+/// Ranges of each size over few and many connections: the table. Returns the requests a second that the slower of both
+/// answers over many, by size.
 fn ranges(
     ours: &Server,
     rival: &Nginx,
     generators: Option<&Processors>,
     runs: usize,
-) -> Result<()> {
+) -> Result<Vec<f64>> {
+    let mut rates = Vec::new();
     println!(
         "| KiB | connections | requests/s | nginx | ratio | slower | p90 ms | nginx | p99 ms | nginx | ratio | slower | server's µs/request | nginx |"
     );
@@ -172,6 +190,9 @@ fn ranges(
                 format!("{middle:.2} ({low:.2}-{high:.2})")
             };
             let (ours, theirs) = (middle(&us), middle(&them));
+            if connections == RATE_CONNECTIONS {
+                rates.push(ours.rate.min(theirs.rate));
+            }
             println!(
                 "| {} | {connections} | {:.0} | {:.0} | {:.2} | {slower_rate} | {:.2} | {:.2} | {} | {} | {:.2} | \
                  {slower_p99} | {:.1} | {:.1} |",
@@ -189,7 +210,118 @@ fn ranges(
             );
         }
     }
+    Ok(rates)
+}
+
+/// Waits where both are asked for as much: the table.
+fn at_a_rate(
+    ours: &Server,
+    rival: &Nginx,
+    generators: &Processors,
+    runs: usize,
+    rates: &[f64],
+) -> Result<()> {
+    println!(
+        "| KiB | requests/s | p50 ms | nginx | p99 ms | nginx | ratio | slower | p99.9 ms | nginx |"
+    );
+    println!("|{}", " --- |".repeat(10));
+    let ours = ours.url.trim_start_matches("http://").to_owned();
+    let theirs = rival.addr.to_string();
+    let ask = |addr: &str, size: u64, rate: f64| -> Result<[f64; 3]> {
+        let output = on(Some(&generators.0), std::env::current_exe()?)
+            .args([AT_A_RATE, addr, &size.to_string(), &rate.to_string()])
+            .output()?;
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let values: Vec<f64> = text.split_whitespace().filter_map(|v| v.parse().ok()).collect();
+        let why = || format!("{addr}: {text}{}", String::from_utf8_lossy(&output.stderr));
+        values.try_into().map_err(|_| why().into())
+    };
+    for (size, rate) in SIZES.into_iter().zip(rates) {
+        let rate = (rate * RATE_SHARE).round();
+        ask(&ours, size, rate)?;
+        let (mut us, mut them) = (Vec::new(), Vec::new());
+        for turn in 0..runs {
+            if turn % 2 == 0 {
+                us.push(ask(&ours, size, rate)?);
+            }
+            them.push(ask(&theirs, size, rate)?);
+            if turn % 2 == 1 {
+                us.push(ask(&ours, size, rate)?);
+            }
+        }
+        let slower = us.iter().zip(&them).filter(|(us, them)| us[1] > them[1]).count();
+        let of = |waits: &[[f64; 3]], which: usize| {
+            median(&mut waits.iter().map(|wait| wait[which]).collect::<Vec<_>>())
+        };
+        println!(
+            "| {} | {rate:.0} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {slower} | {:.2} | {:.2} |",
+            size >> 10,
+            of(&us, 0),
+            of(&them, 0),
+            of(&us, 1),
+            of(&them, 1),
+            of(&us, 1) / of(&them, 1),
+            of(&us, 2),
+            of(&them, 2),
+        );
+    }
     Ok(())
+}
+
+/// Asks for ranges of that many bytes at that rate, and prints within how many milliseconds a half, 99 and 99.9 % of the
+/// answers came. Every request is due at a time of its own; one that has to wait for the answer before it waits since
+/// then.
+fn ask_at_a_rate(addr: SocketAddr, size: u64, rate: f64) -> Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let interval = Duration::from_secs_f64(f64::from(RATE_CONNECTIONS) / rate);
+    let requests: Arc<Vec<Vec<u8>>> = Arc::new(range_requests(size));
+    let waits = runtime.block_on(async {
+        // Time for all to connect.
+        let begin = Instant::now() + Duration::from_millis(200);
+        let until = begin + Duration::from_secs(SECONDS.into());
+        let mut asking = tokio::task::JoinSet::new();
+        for index in 0..RATE_CONNECTIONS {
+            let requests = Arc::clone(&requests);
+            asking.spawn(async move {
+                let stream = TcpStream::connect(addr).await?;
+                stream.set_nodelay(true)?;
+                let mut due =
+                    begin + interval.mul_f64(f64::from(index) / f64::from(RATE_CONNECTIONS));
+                let mut waits = Vec::new();
+                for request in requests.iter().cycle().skip(index as usize * 7) {
+                    if due > until {
+                        break;
+                    }
+                    // How late the clock wakes us is not the server's doing.
+                    let start = if Instant::now() < due {
+                        tokio::time::sleep_until(due.into()).await;
+                        Instant::now()
+                    } else {
+                        due
+                    };
+                    exchange(&stream, request).await?;
+                    waits.push(start.elapsed());
+                    due += interval;
+                }
+                Ok::<_, io::Error>(waits)
+            });
+        }
+        let mut waits = Vec::new();
+        while let Some(ended) = asking.join_next().await {
+            waits.extend(ended??);
+        }
+        Ok::<_, Box<dyn Error>>(waits)
+    })?;
+    let [half, p99, p999] = [500, 990, 999].map(|share| within(waits.clone(), share));
+    println!("{} {} {}", half?, p99?, p999?);
+    Ok(())
+}
+
+/// Milliseconds within which so many thousandths came.
+fn within(mut waits: Vec<Duration>, thousandths: usize) -> Result<f64> {
+    waits.sort_unstable();
+    let wait = waits.get(waits.len() * thousandths / 1000).ok_or("nothing was answered")?;
+    Ok(wait.as_secs_f64() * 1e3)
 }
 
 /// A program, on these processors alone if so.
@@ -391,23 +523,23 @@ fn range_script(size: u64) -> String {
     )
 }
 
-/// Places in the file, always the same ones.
-fn places() -> impl Iterator<Item = u64> {
+/// Places in the file for so many bytes, always the same ones.
+fn places(bytes: u64) -> impl Iterator<Item = u64> {
     let next = |state: &u64| Some(state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1));
     let states = std::iter::successors(Some(1u64), next).skip(1);
-    states.map(|state| (state >> 33) % (FILE_BYTES - u64::from(NODE_BYTES)))
+    states.map(move |state| (state >> 33) % (FILE_BYTES - bytes))
 }
 
-fn node_requests() -> Vec<Vec<u8>> {
+fn range_requests(bytes: u64) -> Vec<Vec<u8>> {
     let request = |first: u64| {
-        let last = first + u64::from(NODE_BYTES) - 1;
+        let last = first + bytes - 1;
         format!("GET /bench.lods HTTP/1.1\r\nhost: x\r\nrange: bytes={first}-{last}\r\n\r\n")
     };
-    places().take(REQUESTS).map(|first| request(first).into_bytes()).collect()
+    places(bytes).take(REQUESTS).map(|first| request(first).into_bytes()).collect()
 }
 
 fn batch_requests() -> Result<Vec<Vec<u8>>> {
-    let mut places = places();
+    let mut places = places(NODE_BYTES.into());
     let mut requests = Vec::new();
     for _ in 0..REQUESTS / NODES {
         let part = |offset| BatchPart { offset, bytes: NODE_BYTES };
@@ -454,16 +586,11 @@ fn ask(addr: SocketAddr, requests: &[Vec<u8>], connections: u32, pids: &[u32]) -
     }
     let seconds = begin.elapsed().as_secs_f64();
     let ticks = ticks(pids) - before;
-    waits.sort_unstable();
-    let within = |percent: usize| -> Result<f64> {
-        let wait = waits.get(waits.len() * percent / 100).ok_or("nothing was answered")?;
-        Ok(wait.as_secs_f64() * 1e3)
-    };
     Ok(Load {
         rate: waits.len() as f64 / seconds,
-        p90_ms: within(90)?,
-        p99_ms: within(99)?,
         cpu_us: ticks as f64 * 10_000.0 / waits.len() as f64,
+        p90_ms: within(waits.clone(), 900)?,
+        p99_ms: within(waits, 990)?,
     })
 }
 
