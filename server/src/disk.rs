@@ -97,9 +97,14 @@ mod tests {
             let hung = std::sync::Arc::clone(&hung);
             tokio::spawn(elsewhere(move || hung.lock().is_ok_and(|hung| hung.recv().is_ok())));
         }
-        while ELSEWHERE.available_permits() > 0 {
-            tokio::task::yield_now().await;
-        }
+        let all_out = async {
+            while ELSEWHERE.available_permits() > 0 {
+                tokio::task::yield_now().await;
+            }
+        };
+        // Far beyond what it takes: the test fails rather than hangs.
+        let waiting = tokio::time::timeout(std::time::Duration::from_secs(20), all_out);
+        waiting.await.expect("each holds its turn");
         assert_eq!(on_pool(|| 1).await, 1, "others have theirs");
         // They come back after all.
         drop(hang);
