@@ -149,6 +149,28 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// Of a dataset without points and attributes, on a lattice of world units.
+    #[must_use]
+    pub fn empty() -> Self {
+        Self {
+            generator: String::new(),
+            points: 0,
+            nodes: 0,
+            levels: 0,
+            refinement: Refinement::Additive,
+            primitive: Primitive::Point,
+            method: Method { name: String::new(), grid: 1, leaf_capacity: 0 },
+            lattice: Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits: 1 },
+            bounds: LatticeBox::EMPTY,
+            largest_rounding: 0.0,
+            attributes: Vec::new(),
+            groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
+            fine: None,
+            crs: None,
+            sources: Vec::new(),
+        }
+    }
+
     /// Parses and checks a manifest.
     ///
     /// # Errors

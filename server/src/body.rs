@@ -162,7 +162,7 @@ impl Rest {
 
     /// Reads a piece on the blocking pool.
     fn read(mut self, mut buffer: Buffer, wanted: usize) -> Reading {
-        let is_here = self.is_here();
+        let (is_here, file) = (self.is_here(), Arc::clone(&self.file));
         let work = move || {
             let read = self.fill(&mut buffer, wanted, read_waiting);
             let read = read.and_then(|()| self.check());
@@ -173,7 +173,11 @@ impl Rest {
                 if is_here { disk::on_pool(work).await } else { disk::elsewhere(work).await }
             };
             let read = timeout(READ_TIMEOUT, read).await;
-            read.map_err(|_| io::Error::new(io::ErrorKind::TimedOut, "the file cannot be read"))
+            read.map_err(|_| {
+                let seconds = READ_TIMEOUT.as_secs();
+                let why = format!("{}: no bytes within {seconds} s", file.path.display());
+                io::Error::new(io::ErrorKind::TimedOut, why)
+            })
         })
     }
 

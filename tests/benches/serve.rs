@@ -238,17 +238,7 @@ fn at_a_rate(
     };
     for (size, rate) in SIZES.into_iter().zip(rates) {
         let rate = (rate * RATE_SHARE).round();
-        ask(&ours, size, rate)?;
-        let (mut us, mut them) = (Vec::new(), Vec::new());
-        for turn in 0..runs {
-            if turn % 2 == 0 {
-                us.push(ask(&ours, size, rate)?);
-            }
-            them.push(ask(&theirs, size, rate)?);
-            if turn % 2 == 1 {
-                us.push(ask(&ours, size, rate)?);
-            }
-        }
+        let (us, them) = by_turns(runs, || ask(&ours, size, rate), || ask(&theirs, size, rate))?;
         let slower = us.iter().zip(&them).filter(|(us, them)| us[1] > them[1]).count();
         let of = |waits: &[[f64; 3]], which: usize| {
             median(&mut waits.iter().map(|wait| wait[which]).collect::<Vec<_>>())
@@ -275,7 +265,7 @@ fn ask_at_a_rate(addr: SocketAddr, size: u64, rate: f64) -> Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let interval = Duration::from_secs_f64(f64::from(RATE_CONNECTIONS) / rate);
     let requests: Arc<Vec<Vec<u8>>> = Arc::new(range_requests(size));
-    let waits = runtime.block_on(async {
+    let mut waits = runtime.block_on(async {
         // Time for all to connect.
         let begin = Instant::now() + Duration::from_millis(200);
         let until = begin + Duration::from_secs(SECONDS.into());
@@ -312,14 +302,14 @@ fn ask_at_a_rate(addr: SocketAddr, size: u64, rate: f64) -> Result<()> {
         }
         Ok::<_, Box<dyn Error>>(waits)
     })?;
-    let [half, p99, p999] = [500, 990, 999].map(|share| within(waits.clone(), share));
+    waits.sort_unstable();
+    let [half, p99, p999] = [500, 990, 999].map(|share| within(&waits, share));
     println!("{} {} {}", half?, p99?, p999?);
     Ok(())
 }
 
-/// Milliseconds within which so many thousandths came.
-fn within(mut waits: Vec<Duration>, thousandths: usize) -> Result<f64> {
-    waits.sort_unstable();
+/// Of waits in order, the milliseconds within which so many thousandths came.
+fn within(waits: &[Duration], thousandths: usize) -> Result<f64> {
     let wait = waits.get(waits.len() * thousandths / 1000).ok_or("nothing was answered")?;
     Ok(wait.as_secs_f64() * 1e3)
 }
@@ -398,11 +388,11 @@ struct Load {
     cpu_us: f64,
 }
 
-fn by_turns(
+fn by_turns<T>(
     runs: usize,
-    ours: impl Fn() -> Result<Load>,
-    theirs: impl Fn() -> Result<Load>,
-) -> Result<(Vec<Load>, Vec<Load>)> {
+    ours: impl Fn() -> Result<T>,
+    theirs: impl Fn() -> Result<T>,
+) -> Result<(Vec<T>, Vec<T>)> {
     // Once in vain: files are opened, buffers grow, the dataset earns its copy.
     ours()?;
     let (mut us, mut them) = (Vec::new(), Vec::new());
@@ -586,11 +576,12 @@ fn ask(addr: SocketAddr, requests: &[Vec<u8>], connections: u32, pids: &[u32]) -
     }
     let seconds = begin.elapsed().as_secs_f64();
     let ticks = ticks(pids) - before;
+    waits.sort_unstable();
     Ok(Load {
         rate: waits.len() as f64 / seconds,
         cpu_us: ticks as f64 * 10_000.0 / waits.len() as f64,
-        p90_ms: within(waits.clone(), 900)?,
-        p99_ms: within(waits, 990)?,
+        p90_ms: within(&waits, 900)?,
+        p99_ms: within(&waits, 990)?,
     })
 }
 

@@ -1,28 +1,15 @@
 //! Trees by hand, for tests.
 
 use lodestream_protocol::{
-    Boot, GroupInfo, Header, HierarchyPage, Lattice, LatticeBox, Manifest, Method, Node, NodeKey,
-    Primitive, Refinement,
+    Boot, Header, HierarchyPage, Lattice, LatticeBox, Manifest, Method, Node, NodeKey,
 };
 
 /// A manifest without points and attributes.
 pub fn manifest() -> Manifest {
     Manifest {
-        generator: "test".into(),
-        points: 0,
-        nodes: 0,
-        levels: 0,
-        refinement: Refinement::Additive,
-        primitive: Primitive::Point,
         method: Method { name: "test".into(), grid: 128, leaf_capacity: 1000 },
         lattice: Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits: 16 },
-        bounds: LatticeBox::EMPTY,
-        largest_rounding: 0.0,
-        attributes: Vec::new(),
-        groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
-        fine: None,
-        crs: None,
-        sources: Vec::new(),
+        ..Manifest::empty()
     }
 }
 

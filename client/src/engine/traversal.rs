@@ -515,21 +515,30 @@ mod tests {
         source::Source,
     };
 
-    #[test]
-    fn that_a_cloud_is_back_is_told_with_the_first_plan_that_knows_of_it() {
+    /// The traversal of that many clouds with a view of the root below. Nothing of their file is ever read.
+    fn traversal(clouds: usize) -> (tempfile::NamedTempFile, Arc<Shared>, Traversal) {
         let file = tempfile::NamedTempFile::new().expect("temporary file");
         let source = Source::parse(file.path().to_str().expect("readable path")).expect("a file");
         let config = EngineConfig::default();
-        let shared = Arc::new(Shared::new(&config, vec![source]));
-        let mut traversal = Traversal::new(Arc::clone(&shared), &config);
+        let shared = Arc::new(Shared::new(&config, vec![source; clouds]));
+        let traversal = Traversal::new(Arc::clone(&shared), &config);
+        let camera = Camera::overview([0.0; 3].into(), [9.0; 3].into(), 1.0);
+        shared.traversal.set_view(View { camera, size_px: [100; 2] }, |_| {});
+        (file, shared, traversal)
+    }
+
+    fn root() -> Node {
+        Node { bounds: LatticeBox { min: [0; 3], max: [8; 3] }, ..node(NodeKey::ROOT) }
+    }
+
+    #[test]
+    fn that_a_cloud_is_back_is_told_with_the_first_plan_that_knows_of_it() {
+        let (_file, shared, mut traversal) = traversal(1);
         let failure = || shared.board.read(|news| news.clouds[0].failure.clone());
         let is_settled = || shared.board.read(|news| news.plan.settled);
         let take = || shared.traversal.try_take().expect("there is news");
-        let camera = Camera::overview([0.0; 3].into(), [9.0; 3].into(), 1.0);
-        shared.traversal.set_view(View { camera, size_px: [100; 2] }, |_| {});
-        let bounds = LatticeBox { min: [0; 3], max: [8; 3] };
         let payloads = vec![PayloadRef { offset: 0, bytes: 1, crc: 0 }];
-        let root = Node { bounds, payloads, ..node(NodeKey::ROOT) };
+        let root = Node { payloads, ..root() };
         let boot = Arc::new(boot([1; 16], manifest(), vec![root]));
         shared.traversal.post(Event::Opened { cloud: 0, boot: Arc::clone(&boot) });
         traversal.step(take());
@@ -558,20 +567,12 @@ mod tests {
 
     #[test]
     fn a_version_that_comes_after_its_cloud_was_removed_is_none_and_the_others_are_replaced() {
-        let file = tempfile::NamedTempFile::new().expect("temporary file");
-        let source = Source::parse(file.path().to_str().expect("readable path")).expect("a file");
-        let config = EngineConfig::default();
-        let shared = Arc::new(Shared::new(&config, vec![source.clone(), source]));
-        let mut traversal = Traversal::new(Arc::clone(&shared), &config);
+        let (_file, shared, mut traversal) = traversal(2);
         let step = |traversal: &mut Traversal| {
             traversal.step(shared.traversal.try_take().expect("there is news"));
             shared.board.read(|news| (Arc::clone(&news.plan), news.clouds.clone()))
         };
-        let bounds = LatticeBox { min: [0; 3], max: [8; 3] };
-        let root = Node { bounds, ..node(NodeKey::ROOT) };
-        let version = |number| Arc::new(boot([number; 16], manifest(), vec![root.clone()]));
-        let camera = Camera::overview([0.0; 3].into(), [9.0; 3].into(), 1.0);
-        shared.traversal.set_view(View { camera, size_px: [100; 2] }, |_| {});
+        let version = |number| Arc::new(boot([number; 16], manifest(), vec![root()]));
         for cloud in [0, 1] {
             shared.traversal.post(Event::Opened { cloud, boot: version(1) });
         }

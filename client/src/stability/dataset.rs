@@ -3,9 +3,7 @@
 use std::path::PathBuf;
 
 use lodestream_preprocess::{BuildConfig, BuildReport, FileSource, Method, Progress, build};
-use lodestream_protocol::{
-    Dataset, GroupInfo, Lattice, LatticeBox, Manifest, Node, NodeKey, Primitive, Refinement,
-};
+use lodestream_protocol::{Dataset, Lattice, LatticeBox, Manifest, Node, NodeKey};
 use tempfile::TempDir;
 
 use super::{
@@ -79,8 +77,6 @@ pub(super) fn manifest(lattice: Lattice) -> Manifest {
         points: 1,
         nodes: 1,
         levels: 1,
-        refinement: Refinement::Additive,
-        primitive: Primitive::Point,
         method: lodestream_protocol::Method {
             name: "poisson".into(),
             grid: 128,
@@ -88,12 +84,7 @@ pub(super) fn manifest(lattice: Lattice) -> Manifest {
         },
         lattice,
         bounds: LatticeBox { min: [0; 3], max: [0; 3] },
-        largest_rounding: 0.0,
-        attributes: Vec::new(),
-        groups: vec![GroupInfo { name: "base".into(), columns: vec![0] }],
-        fine: None,
-        crs: None,
-        sources: Vec::new(),
+        ..Manifest::empty()
     }
 }
 
