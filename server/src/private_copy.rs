@@ -40,6 +40,9 @@ const CHUNK_BYTES: usize = 1 << 20;
 /// Most bytes that one call sends: others are to have their turn.
 const TURN_BYTES: u64 = 1 << 20;
 
+/// So much comes into the system's cache, and leaves it, together nearly always: reading ahead begins at 128 KiB.
+const TOGETHER_BYTES: u64 = 64 << 10;
+
 /// What all copies may take.
 #[derive(Debug)]
 pub(crate) struct PrivateCopies {
@@ -159,8 +162,9 @@ fn unnamed_file(_: &Path, _: u64) -> io::Result<File> {
 
 #[cfg(target_os = "linux")]
 impl PrivateCopy {
-    /// Whether the ends of the range are in the system's cache. A thread that sends what is not waits
-    /// for the disk; where both ends are there, what lies between nearly always is.
+    /// Whether the ends of the range (of a short one, its end) are in the system's cache. A thread that sends what is
+    /// not waits for the disk; where both ends are there, what lies between nearly always is. One of two such questions
+    /// takes 5 % of the time of a request of 16 KiB.
     pub(crate) fn is_cached(&self, range: &Range<u64>) -> bool {
         use rustix::io::{ReadWriteFlags, preadv2};
         let is_there = |offset| {
@@ -168,7 +172,14 @@ impl PrivateCopy {
             let byte = &mut [io::IoSliceMut::new(byte)];
             preadv2(&self.file, byte, offset, ReadWriteFlags::NOWAIT) == Ok(1)
         };
-        is_there(range.start) && is_there(range.end - 1)
+        let is_short = range.end - range.start <= TOGETHER_BYTES;
+        is_there(range.end - 1) && (is_short || is_there(range.start))
+    }
+
+    /// Sends bytes that wait for the pages sent next.
+    pub(crate) fn send_before_pages(&self, stream: &TcpStream, bytes: &[u8]) -> io::Result<usize> {
+        use rustix::net::{SendFlags, send};
+        Ok(send(stream, bytes, SendFlags::MORE | SendFlags::NOSIGNAL)?)
     }
 
     /// Sends some of the range.
@@ -184,6 +195,10 @@ impl PrivateCopy {
 impl PrivateCopy {
     pub(crate) fn is_cached(&self, _: &Range<u64>) -> bool {
         false
+    }
+
+    pub(crate) fn send_before_pages(&self, _: &TcpStream, _: &[u8]) -> io::Result<usize> {
+        Err(io::ErrorKind::Unsupported.into())
     }
 
     pub(crate) fn send_pages(&self, _: &TcpStream, _: &Range<u64>) -> io::Result<usize> {

@@ -16,6 +16,7 @@ mod answer;
 mod head;
 mod refused;
 mod send;
+mod turn;
 
 use std::{
     future::{Future, poll_fn},
@@ -134,6 +135,7 @@ pub(crate) async fn serve(
             until_last_byte: start.elapsed(),
             is_whole: sent.is_ok(),
         });
+        turn::count(length);
         let file_name = request.file_name;
         match sent {
             Ok(()) => {}
