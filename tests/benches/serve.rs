@@ -5,7 +5,8 @@
 //! by turns, so that a drift of the machine's speed meets both: first from processors of its own, then from the
 //! same ones, where the threads that are busy wait for each other (with few connections nginx has often all of
 //! them on one worker, so that fewer threads share the processors: its requests are slower then, its slowest
-//! faster). The slowest hundredth is decided by whatever else takes a processor for a millisecond: behind its
+//! faster). The slowest hundredth is decided by whatever else takes a processor for a millisecond (wrk counts a
+//! wait as if it had gone on asking meanwhile, so that it is a hundredth of the time, nearly): behind its
 //! medians stand quartiles, and in how many turns ours was the slower. wrk asks as fast as it is answered, so that
 //! waits are those of queues, and how much of them is seen depends on which side they form; so a load generator of this
 //! bench also asks both at the same rate, three fifths of what the slower one gives. Then many nodes of 16 KiB by batches,
@@ -73,9 +74,10 @@ fn main() -> Result<()> {
     write_file(&folder.path().join("bench.lods"))?;
     let processors = std::thread::available_parallelism()?.get();
     println!(
-        "{}, {processors} cores, medians of {runs} runs of {SECONDS} s by turns (quartiles behind them); ratios are \
+        "{}, {processors} cores, {} on TCP, medians of {runs} runs of {SECONDS} s by turns (quartiles behind them); ratios are \
          ours to nginx's; slower: turns in which ours was",
         Nginx::version()?,
+        congestion_control(),
     );
     if let Some((servers, generators)) = halves(processors) {
         println!("\nServers on one half of the cores, wrk on the other:\n");
@@ -138,6 +140,12 @@ fn main() -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// How the system controls congestion: what answers of several packets wait for hangs on it.
+fn congestion_control() -> String {
+    fs::read_to_string("/proc/sys/net/ipv4/tcp_congestion_control")
+        .map_or_else(|_| "unknown congestion control".to_owned(), |name| name.trim().to_owned())
 }
 
 /// Processors as `taskset` takes them, and how many.

@@ -23,11 +23,13 @@ use crate::{
 /// and copies: 96 and 103 of 1 KiB, 95 and 93 of 4, 93 and 75 of 16, 49 and 46 of 64.)
 const SENDFILE_BYTES: u64 = 4 << 10;
 
-/// Head and pages that are no longer than this together leave in one packet: the longest packet of the loopback
-/// device, and of what is sent in one piece to a network card, is 64 KiB. (16 KiB: 93 thousand requests a second with the head in the
-/// packet, 76 with it before. Longer answers take several packets anyhow, and lose up to a quarter where the
-/// first one waits for the pages, for a reason that was not found.)
-const PACKET_BYTES: u64 = 60 << 10;
+/// Answers whose head leaves at once, in a packet of its own, rather than with the first pages.
+///
+/// Up to 60 KiB, all is one packet (of 64 KiB at most, on the loopback device as for a network card): 93 thousand requests a second of
+/// 16 KiB, not 76. Long answers are helped, too, where the system controls congestion by BBR: it takes the
+/// way of a head alone for the shortest there is, and lets less be on it at a time (1 MiB: 4.4 thousand, not
+/// 2.2; 4.2, not 3.9 with CUBIC). Between them it costs up to a quarter (BBR) or a tenth (CUBIC), for a reason that was not found.
+const HEAD_FIRST: Range<u64> = 60 << 10..512 << 10;
 
 /// Why an answer was not sent whole.
 #[derive(Debug)]
@@ -126,13 +128,14 @@ impl Socket<'_> {
         mut head: &[u8],
         mut range: Range<u64>,
     ) -> io::Result<()> {
-        if head.len() as u64 + (range.end - range.start) <= PACKET_BYTES {
+        let length = head.len() as u64 + (range.end - range.start);
+        if HEAD_FIRST.contains(&length) {
+            self.send_all(head).await?;
+        } else {
             while !head.is_empty() {
                 let send = || copy.send_before_pages(self.stream, head);
                 head = &head[self.try_send(send).await?..];
             }
-        } else {
-            self.send_all(head).await?;
         }
         while !range.is_empty() {
             range.start += self.try_send(|| copy.send_pages(self.stream, &range)).await? as u64;
