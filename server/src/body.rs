@@ -123,6 +123,11 @@ impl FileBody {
                 State::Ready(mut rest) => {
                     let mut buffer = self.pool.take();
                     let wanted = usize::try_from(self.left).unwrap_or(usize::MAX).min(PIECE_BYTES);
+                    // Nobody can change that one.
+                    if rest.fill(&mut buffer, wanted, read_private_copy).is_ok() {
+                        self.state = State::Ready(rest);
+                        return Poll::Ready(Ok(buffer));
+                    }
                     if rest.is_here() && rest.fill(&mut buffer, wanted, read_cached).is_ok() {
                         let checked = rest.check();
                         self.state = State::Ready(rest);
@@ -280,10 +285,17 @@ fn read_waiting(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::
 /// Reads some bytes that can be had without waiting for the disk; at least one. Where the file system
 /// cannot tell, there are none.
 fn read_cached(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::Result<usize> {
-    match file.source.read_cached(buffer, rest.start)? {
-        0 => Err(io::ErrorKind::WouldBlock.into()),
-        count => Ok(count),
-    }
+    at_least_one(file.source.read_cached(buffer, rest.start)?)
+}
+
+/// As [`read_cached`], of the file's private copy.
+fn read_private_copy(file: &DatasetFile, buffer: &mut [u8], rest: Range<u64>) -> io::Result<usize> {
+    let copy = file.private_copy.get();
+    at_least_one(copy.map_or(Ok(0), |copy| copy.read_cached(buffer, rest.start))?)
+}
+
+fn at_least_one(count: usize) -> io::Result<usize> {
+    if count == 0 { Err(io::ErrorKind::WouldBlock.into()) } else { Ok(count) }
 }
 
 #[cfg(test)]

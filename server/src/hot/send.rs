@@ -19,17 +19,22 @@ use crate::{
     routes::{Site, batch_segments},
 };
 
-/// From this length on, sending pages is no slower than copying bytes. (Thousands of requests a second at random places, 16 connections, pages
-/// and copies: 96 and 103 of 1 KiB, 95 and 93 of 4, 93 and 75 of 16, 49 and 46 of 64.)
-const SENDFILE_BYTES: u64 = 4 << 10;
+/// Answers of these lengths leave as pages of the file, in one packet with their head, rather than as bytes that were read.
+///
+/// Thousands of requests a second at random places, 16 connections, pages and bytes: 88 and 102 of 4 KiB, 93 and 79 of 16, 85 and 87 of
+/// 32, 48 and 60 of 64. Waits are shorter by pages: for bytes the system takes fresh memory each time.
+const SHORT_PAGES: Range<u64> = 8 << 10..40 << 10;
+
+/// So do all answers from this length on: 34 and 29 of 128 KiB. Of longer ones bytes are no slower (19 and 20 of 256), but cost the
+/// server up to a fifth more of its time.
+const LONG_PAGES: u64 = 128 << 10;
 
 /// Answers whose head leaves at once, in a packet of its own, rather than with the first pages.
 ///
-/// Up to 60 KiB, all is one packet (of 64 KiB at most, on the loopback device as for a network card): 93 thousand requests a second of
-/// 16 KiB, not 76. Long answers are helped, too, where the system controls congestion by BBR: it takes the
-/// way of a head alone for the shortest there is, and lets less be on it at a time (1 MiB: 4.4 thousand, not
-/// 2.2; 4.2, not 3.9 with CUBIC). Between them it costs up to a quarter (BBR) or a tenth (CUBIC), for a reason that was not found.
-const HEAD_FIRST: Range<u64> = 60 << 10..512 << 10;
+/// Waiting costs them up to a quarter of the requests a second, for a reason that was not found. It helps all others: 93 thousand of 16 KiB,
+/// not 76; 4.4 thousand of 1 MiB, not 2.2, where the system controls congestion by BBR, which takes the way of a head
+/// alone for the shortest there is, and lets less be on it at a time (with CUBIC 4.2, not 3.9).
+const HEAD_FIRST: Range<u64> = LONG_PAGES..512 << 10;
 
 /// Why an answer was not sent whole.
 #[derive(Debug)]
@@ -56,12 +61,11 @@ pub(super) async fn send(
 ) -> Result<(), Broken> {
     let socket = Socket { stream, limits };
     let (file, length) = (&answer.file, answer.len());
-    if let Content::Range(range) = &answer.content
-        && length >= SENDFILE_BYTES
-    {
+    if let Content::Range(range) = &answer.content {
+        let is_for_pages = SHORT_PAGES.contains(&length) || length >= LONG_PAGES;
         match file.private_copy.get() {
             None => private_copy::count(file, length, &site.private_copies),
-            Some(copy) if copy.is_cached(range) => {
+            Some(copy) if is_for_pages && copy.is_cached(range) => {
                 return Ok(socket.send_pages(copy, head, range.clone()).await?);
             }
             Some(_) => {}
@@ -128,8 +132,7 @@ impl Socket<'_> {
         mut head: &[u8],
         mut range: Range<u64>,
     ) -> io::Result<()> {
-        let length = head.len() as u64 + (range.end - range.start);
-        if HEAD_FIRST.contains(&length) {
+        if HEAD_FIRST.contains(&(range.end - range.start)) {
             self.send_all(head).await?;
         } else {
             while !head.is_empty() {

@@ -35,7 +35,7 @@ pub(crate) use folder::{Folder, SUFFIX, dataset_name};
 pub(crate) use object::Object;
 pub(crate) use objects::Objects;
 pub(crate) use small::SmallFile;
-pub(crate) use source::Source;
+pub(crate) use source::{Source, read_cached};
 
 /// Where the datasets are.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! What the bytes of a dataset come from.
 
-use std::{io, ops::Range};
+use std::{fs::File, io, ops::Range};
 
 use lodestream_preprocess::FileSource;
 use lodestream_protocol::{ReadAt, Result as FormatResult};
@@ -21,7 +21,7 @@ impl Source {
     /// Reads some bytes that can be had without waiting; returns how many.
     pub(crate) fn read_cached(&self, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
         match self {
-            Self::File(file) => read_cached(file, buffer, offset),
+            Self::File(file) => read_cached(file.file(), buffer, offset),
             Self::Object(object) => Ok(object.read_cached(buffer, offset)),
         }
     }
@@ -38,16 +38,16 @@ impl Source {
     }
 }
 
-/// What the system has in its cache; nothing where it cannot tell.
+/// Reads what the system has in its cache; nothing where it cannot tell.
 #[cfg(target_os = "linux")]
-fn read_cached(file: &FileSource, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
+pub(crate) fn read_cached(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
     use rustix::io::{ReadWriteFlags, preadv2};
     let rest = &mut [io::IoSliceMut::new(buffer)];
-    Ok(preadv2(file.file(), rest, offset, ReadWriteFlags::NOWAIT)?)
+    Ok(preadv2(file, rest, offset, ReadWriteFlags::NOWAIT)?)
 }
 
 #[cfg(not(target_os = "linux"))]
-fn read_cached(_: &FileSource, _: &mut [u8], _: u64) -> io::Result<usize> {
+pub(crate) fn read_cached(_: &File, _: &mut [u8], _: u64) -> io::Result<usize> {
     Ok(0)
 }
 
