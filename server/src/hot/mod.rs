@@ -8,8 +8,8 @@
 //! pages themselves (`sendfile`), from a [private copy](crate::private_copy).
 //!
 //! The server's processor time for each request, µs, beside nginx 1.22 (`sendfile`, no access log), on a
-//! core of its own, 16 connections, ranges at any byte, by `./dev bench serve`: 10.5 (nginx 13.4) for 4 KiB, 15.9
-//! (18.1) for 64 KiB, 37.6 (41.2) for 256 KiB, 193 (200) for 1 MiB. The long way took 13.5 for 4 KiB when this
+//! core of its own, 16 connections, ranges at any byte, by `./dev bench serve`: 10.3 (nginx 13.8) for 4 KiB, 11.0 (13.6)
+//! for 16 KiB, 19.3 (20.1) for 64 KiB, 38.9 (43.5) for 256 KiB, 192 (215) for 1 MiB. The long way took 13.5 for 4 KiB when this
 //! took 10.6.
 
 mod answer;
