@@ -331,16 +331,8 @@ mod tests {
 
     fn manifest() -> Manifest {
         Manifest {
-            generator: String::new(),
-            points: 0,
-            nodes: 0,
-            levels: 0,
-            refinement: Refinement::Additive,
-            primitive: Primitive::Point,
             method: Method { name: String::new(), grid: 128, leaf_capacity: 1 },
             lattice: Lattice { scale: 1.0, offset: [0.0; 3], origin: [0; 3], side_bits: 8 },
-            bounds: LatticeBox::EMPTY,
-            largest_rounding: 0.0,
             attributes: vec![Attribute {
                 name: "intensity".into(),
                 scalar: ScalarType::U16,
@@ -354,9 +346,7 @@ mod tests {
                 GroupInfo { name: "base".into(), columns: vec![7] },
                 GroupInfo { name: "more".into(), columns: vec![8] },
             ],
-            fine: None,
-            crs: None,
-            sources: vec![],
+            ..Manifest::empty()
         }
     }
 

@@ -21,15 +21,15 @@ use crate::{
 
 /// Answers of these lengths leave as pages of the file, in one packet with their head, rather than as bytes that were read.
 ///
-/// Thousands of requests a second at random places, 16 connections, pages and bytes: 88 and 102 of 4 KiB, 93 and 79 of 16, 85 and 87 of
-/// 32, 48 and 60 of 64. Waits are shorter by pages: for bytes the system takes fresh memory each time. With the head in a packet of
-/// its own, 76 of 16 KiB.
+/// Thousands of requests a second at random places, 16 connections, pages and bytes: 88 and 102 of 4 KiB, 93 and 79 (of the file itself) of
+/// 16, 85 and 87 of 32, 48 and 60 of 64. Waits are shorter by pages, likely as the system takes fresh memory for bytes. With the head
+/// in a packet of its own, 76 of 16 KiB.
 const SHORT_PAGES: Range<u64> = 8 << 10..40 << 10;
 
-/// So do all answers from this length on, behind their head: 34 and 29 of 128 KiB. Of longer ones bytes are no slower (19 and 20 of
+/// So do all answers from this length on, behind their head: 34 and 25 of 128 KiB. Of longer ones bytes are no slower (19 and 20 of
 /// 256), but cost the server up to a fifth more of its time. Heads that wait for the first pages take up to a quarter of the requests away, for
-/// a reason that was not found. (But not of 1 MiB over few connections, where BBR controls congestion: it takes the way of a head alone
-/// for the shortest there is, and lets less be on it at a time; 4.4, not 2.2. Over 256 connections 0.94 of it.)
+/// a reason that was not found. (But not of 1 MiB over few connections, where BBR controls congestion: 4.4, not 2.2; likely as it takes
+/// the way of a head alone for the shortest there is, and lets less be on it at a time. Over 256 connections 0.94 of it.)
 const LONG_PAGES: u64 = 128 << 10;
 
 /// Why an answer was not sent whole.
@@ -132,7 +132,7 @@ impl Socket<'_> {
             self.send_all(head).await?;
         } else {
             while !head.is_empty() {
-                let send = || copy.send_before_pages(self.stream, head);
+                let send = || private_copy::send_before_pages(self.stream, head);
                 head = &head[self.try_send(send).await?..];
             }
         }
