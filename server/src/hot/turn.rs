@@ -17,6 +17,10 @@ const TURN_BYTES: u64 = 1280 << 10;
 /// What a request costs besides its bytes, in bytes: 10 µs.
 const REQUEST_BYTES: u64 = 64 << 10;
 
+/// What counts of an answer at most. Longer ones wait for their clients, nearly always, and so let others go first
+/// by themselves; to count them whole takes 3 to 8 % of the requests of 80 KiB to 1 MiB away, and shortens no wait.
+const ANSWER_BYTES: u64 = 64 << 10;
+
 thread_local! {
     static TURN: Turn = const { Turn(Cell::new(0)) };
 }
@@ -33,7 +37,7 @@ struct Turn(Cell<u64>);
 
 impl Turn {
     fn ends_with(&self, bytes: u64) -> bool {
-        let done = self.0.get().saturating_add(REQUEST_BYTES).saturating_add(bytes);
+        let done = self.0.get() + REQUEST_BYTES + bytes.min(ANSWER_BYTES);
         let is_over = done >= TURN_BYTES;
         self.0.set(if is_over { 0 } else { done });
         is_over
@@ -51,9 +55,9 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_ends_after_many_small_requests_or_a_long_one() {
+    fn a_turn_ends_after_many_requests_and_sooner_after_longer_ones() {
         let of_sizes = [0, 4 << 10, 64 << 10, 256 << 10, 2 << 20, u64::MAX].map(requests_of);
-        assert_eq!(of_sizes, [20, 19, 10, 4, 1, 1]);
+        assert_eq!(of_sizes, [20, 19, 10, 10, 10, 10]);
     }
 
     #[test]
