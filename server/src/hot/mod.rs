@@ -8,9 +8,9 @@
 //! pages themselves (`sendfile`), from a [private copy](crate::private_copy).
 //!
 //! The server's processor time for each request, µs, beside nginx 1.22 (`sendfile`, no access log), on a
-//! core of its own, 16 connections, ranges at any byte, by `./dev bench serve`: 10.3 (nginx 13.8) for 4 KiB, 11.0 (13.6)
-//! for 16 KiB, 19.3 (20.1) for 64 KiB, 38.9 (43.5) for 256 KiB, 192 (215) for 1 MiB. The long way took 13.5 for 4 KiB when this
-//! took 10.6.
+//! core of its own, 16 connections, ranges at any byte, by `./dev bench serve`: 14.6 (nginx 18.6) for 4 KiB, 13.9 (17.8)
+//! for 16 KiB, 24.8 (24.6) for 64 KiB. Of longer answers the server's system does more, where it does not wait for room, and the
+//! client's less: 68.6 (59.0) for 256 KiB, 231 (197) for 1 MiB. The long way took 13.5 for 4 KiB when this took 10.6, on a faster machine.
 
 mod answer;
 mod head;

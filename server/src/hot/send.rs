@@ -35,8 +35,8 @@ const HEAD_ALONE: Range<u64> = 80 << 10..240 << 10;
 /// How many of the first bytes of an answer of so many its head waits for, so that they share a packet.
 ///
 /// A head alone costs one packet more. What is worse, the client's system takes the moment between
-/// it and the next packet for the time that the way takes, and offers little room: 0.2 to 0.5 MB, not 2 to 5 (1 MiB over
-/// 16 connections), of which there was none left 97 % of the time. But where two to four packets make an answer, a client
+/// it and the next packet for the time that the way takes, and offers little room: 0.2 to 0.5 MB (1 MiB over
+/// 16 connections; 2 to 5 where a head waits for all), of which there was none left 97 % of the time. But where two to four packets make an answer, a client
 /// that has the head already is the sooner done. Requests a second beside nginx, whose heads go alone, over 16 and 256 connections
 /// (`wrk` on a processor of its own, BBR, medians of 5 turns):
 ///
