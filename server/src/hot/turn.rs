@@ -11,7 +11,7 @@
 
 use std::{cell::Cell, thread};
 
-/// A turn, in bytes that are sent: about 0.2 ms.
+/// A turn, in bytes that are sent: about 0.2 ms of answers that are counted whole.
 const TURN_BYTES: u64 = 1280 << 10;
 
 /// What a request costs besides its bytes, in bytes: 10 µs.

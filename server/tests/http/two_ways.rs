@@ -111,7 +111,10 @@ fn what_is_asked_for_again_and_again_is_sent_right_however_it_is_sent() {
     }
     // Of lengths that are read, that leave with their head, behind it, and a part with it; also at places where no page
     // begins.
-    for length in [1, 8_191, 8_192, 61_440, 61_441, 81_919, 81_920, 200_000, 245_760, 600_000] {
+    for length in [
+        1, 8_191, 8_192, 16_385, 40_959, 40_960, 61_440, 61_441, 65_536, 81_919, 81_920, 131_072,
+        200_000, 245_759, 245_760, 600_000,
+    ] {
         for first in [0, 4_096, 1_234_567] {
             let last = first + length - 1;
             let range = format!("range: bytes={first}-{last}\r\n");
